@@ -1,0 +1,127 @@
+"""The seam between an estimator and everything around it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ekf_fusion_ros.samples import Sample
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class GeoPoint:
+    """Latitude and longitude in deg, altitude in m in the datum of the fixes."""
+
+    lat: float
+    lon: float
+    alt: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NavState:
+    """Navigation state of the body origin predicted to `time_us`, NED/FRD, SI.
+
+    quaternion (4,) w, x, y, z body to earth; velocity (3,), position (3,) NED; angular_rate (3,)
+    body rad/s, bias removed; acceleration (3,) earth, gravity removed. pose_cov (6, 6): position
+    NED then small rotations about the earth axes; velocity_cov (3, 3) NED. Covariances are those
+    of the fusion horizon.
+    """
+
+    time_us: int
+    quaternion: Array
+    velocity: Array
+    position: Array
+    angular_rate: Array
+    pose_cov: Array
+    velocity_cov: Array
+    gyro_bias: Array
+    accel_bias: Array
+    origin: GeoPoint | None
+    yaw_aligned: bool
+    dead_reckoning: bool
+    local_position_valid: bool
+    global_position_valid: bool
+
+
+@dataclass(frozen=True, slots=True)
+class AidStatus:
+    """Latest verdict on one kind of observation, named as PX4 names its aid sources.
+
+    Vectors hold one entry per component. `test_ratio` is innovation^2 / (gate^2 variance).
+    Counters run from the start of the estimator.
+    """
+
+    name: str
+    active: bool
+    time_us: int
+    innovation: tuple[float, ...]
+    innovation_variance: tuple[float, ...]
+    test_ratio: float
+    innovation_rejected: bool
+    fused: int
+    rejected: int
+    first_fused_us: int
+    last_fused_us: int
+    starts: int
+    stops: int
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something worth telling: time and one sentence."""
+
+    time_us: int
+    text: str
+
+
+class HealthLevel(IntEnum):
+    """Severity, numbered as diagnostic_msgs does."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """Level, one sentence, and the numbers behind it (for diagnostics)."""
+
+    level: HealthLevel
+    text: str
+    values: Mapping[str, str]
+
+
+class Estimator(Protocol):
+    """What a session needs of an estimator."""
+
+    def push(self, sample: Sample) -> None:
+        """Queue a measurement; IMU samples drive time."""
+
+    def update(self) -> bool:
+        """Process the pushed IMU sample; True when the filter state advanced."""
+
+    def nav_state(self) -> NavState | None:
+        """Return the state predicted to the newest IMU sample, None before initialisation."""
+
+    def aid_statuses(self) -> Sequence[AidStatus]:
+        """Return one record per kind of observation seen so far."""
+
+    def drain_events(self) -> Sequence[Event]:
+        """Return and forget the events since the last call."""
+
+    def health(self) -> Health:
+        """Say in one sentence what the estimator is doing."""
+
+    def set_origin(self, origin: GeoPoint) -> bool:
+        """Move the origin of the local frame; False where the point is unusable."""
+
+    def reset(self) -> None:
+        """Forget everything but the parameters."""

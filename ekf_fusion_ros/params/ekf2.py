@@ -1,0 +1,269 @@
+"""Parameters of the EKF2 estimator, grouped by sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from dataclasses import field
+
+from ekf_fusion_ros.params.spec import param
+
+Vector = tuple[float, float, float]
+ZERO: Vector = (0.0, 0.0, 0.0)
+
+MAG_TYPES = ('auto', 'heading', 'three_axis', 'vtol', 'indoor', 'none')
+HEIGHT_REFERENCES = ('baro', 'gnss', 'range', 'vision')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimingParams:
+    """Buffers and the delayed fusion horizon."""
+
+    sensor_interval_min_ms: float = param(
+        20.0, 'Shortest interval between samples of one aiding sensor.', unit='ms', min=1,
+        max=1000, ecl='sensor_interval_min_ms')
+    horizon_min_ms: float = param(
+        0.0, 'Shortest delay of the fusion horizon. Raise it when messages arrive later after '
+        'their stamp than the largest sensor delay.', unit='ms', min=0, max=2000)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImuParams:
+    """Inertial input and its biases."""
+
+    gyro_noise: float = param(
+        1.5e-2, 'Rate noise for covariance prediction.', unit='rad/s', min=1e-4, max=1.0,
+        px4='EKF2_GYR_NOISE', ecl='gyro_noise')
+    accel_noise: float = param(
+        0.35, 'Accelerometer noise for covariance prediction.', unit='m/s^2', min=1e-3, max=1.0,
+        px4='EKF2_ACC_NOISE', ecl='accel_noise')
+    gyro_bias_process_noise: float = param(
+        1e-3, 'Gyro bias random walk.', unit='rad/s^2', min=0, max=1.0,
+        px4='EKF2_GYR_B_NOISE', ecl='gyro_bias_p_noise')
+    accel_bias_process_noise: float = param(
+        1e-2, 'Accelerometer bias random walk.', unit='m/s^3', min=0, max=1.0,
+        px4='EKF2_ACC_B_NOISE', ecl='accel_bias_p_noise')
+    switch_on_gyro_bias: float = param(
+        0.1, 'Initial 1-sigma gyro bias.', unit='rad/s', min=0, max=0.5,
+        px4='EKF2_GBIAS_INIT', ecl='switch_on_gyro_bias')
+    switch_on_accel_bias: float = param(
+        0.2, 'Initial 1-sigma accelerometer bias.', unit='m/s^2', min=0, max=1.0,
+        px4='EKF2_ABIAS_INIT', ecl='switch_on_accel_bias')
+    initial_tilt_err: float = param(
+        0.1, 'Initial 1-sigma tilt error.', unit='rad', min=0, max=0.5,
+        px4='EKF2_ANGERR_INIT', ecl='initial_tilt_err')
+    accel_bias_limit: float = param(
+        0.4, 'Largest accelerometer bias.', unit='m/s^2', min=0, max=2.0,
+        px4='EKF2_ABL_LIM', ecl='acc_bias_lim')
+    accel_bias_learn_accel_limit: float = param(
+        25.0, 'Acceleration above which accelerometer biases are not learned.', unit='m/s^2',
+        min=1, max=200, px4='EKF2_ABL_ACCLIM', ecl='acc_bias_learn_acc_lim')
+    accel_bias_learn_gyro_limit: float = param(
+        3.0, 'Rate above which accelerometer biases are not learned.', unit='rad/s', min=0.1,
+        max=20, px4='EKF2_ABL_GYRLIM', ecl='acc_bias_learn_gyr_lim')
+    accel_bias_learn_time: float = param(
+        0.5, 'Decay time of the manoeuvre level that inhibits bias learning.', unit='s',
+        min=0.05, max=10, px4='EKF2_ABL_TAU', ecl='acc_bias_learn_tc')
+    inhibit_accel_bias: bool = param(False, 'Do not estimate accelerometer biases.')
+    moving_scaler: float = param(
+        1.0, 'Scale of the thresholds of the at-rest detection.', min=0.1, max=10,
+        px4='EKF2_MOVE_TEST', ecl='is_moving_scaler')
+    position: Vector = param(
+        ZERO, 'IMU position in the body frame (FRD).', unit='m', ecl='imu_pos_body')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GnssCheckParams:
+    """Receiver quality checks that gate the start of GNSS aiding."""
+
+    nsats: bool = param(True, 'Check the number of satellites.')
+    pdop: bool = param(False, 'Check the position dilution.')
+    hacc: bool = param(True, 'Check the horizontal accuracy.')
+    vacc: bool = param(False, 'Check the vertical accuracy.')
+    sacc: bool = param(True, 'Check the speed accuracy.')
+    hdrift: bool = param(False, 'Check horizontal position drift at rest.')
+    vdrift: bool = param(False, 'Check vertical position drift at rest.')
+    hspeed: bool = param(False, 'Check horizontal speed at rest.')
+    vspeed: bool = param(False, 'Check vertical speed against the filter.')
+    req_hacc: float = param(5.0, 'Largest horizontal accuracy.', unit='m', min=0.1, max=1000,
+                            px4='EKF2_REQ_EPH', ecl='req_hacc')
+    req_vacc: float = param(8.0, 'Largest vertical accuracy.', unit='m', min=0.1, max=1000,
+                            px4='EKF2_REQ_EPV', ecl='req_vacc')
+    req_sacc: float = param(1.0, 'Largest speed accuracy.', unit='m/s', min=0.05, max=50,
+                            px4='EKF2_REQ_SACC', ecl='req_sacc')
+    req_nsats: int = param(6, 'Smallest number of satellites.', min=0, max=60,
+                           px4='EKF2_REQ_NSATS', ecl='req_nsats')
+    req_pdop: float = param(2.0, 'Largest position dilution.', min=0.5, max=50,
+                            px4='EKF2_REQ_PDOP', ecl='req_pdop')
+    req_hdrift: float = param(0.3, 'Largest horizontal drift speed.', unit='m/s', min=0.01,
+                              max=10, px4='EKF2_REQ_HDRIFT', ecl='req_hdrift')
+    req_vdrift: float = param(0.5, 'Largest vertical drift speed.', unit='m/s', min=0.01,
+                              max=10, px4='EKF2_REQ_VDRIFT', ecl='req_vdrift')
+    health_time: float = param(10.0, 'Time the checks must pass before the origin is set.',
+                               unit='s', min=0, max=60)
+    start_time: float = param(5.0, 'Time without a failed check before aiding starts.',
+                              unit='s', min=0, max=60)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GnssParams:
+    """GNSS position, velocity and height aiding."""
+
+    enabled: bool = param(True, 'Use GNSS position and velocity.')
+    yaw: bool = param(False, 'Use the yaw of a dual-antenna receiver.')
+    delay_ms: float = param(110.0, 'Delay of the receiver against the IMU.', unit='ms', min=0,
+                            max=1000, px4='EKF2_GPS_DELAY', ecl='gps_delay_ms')
+    vel_noise: float = param(0.5, 'Lower limit of the velocity noise.', unit='m/s', min=0.01,
+                             max=10, px4='EKF2_GPS_V_NOISE', ecl='gps_vel_noise')
+    pos_noise: float = param(0.5, 'Lower limit of the position noise.', unit='m', min=0.01,
+                             max=100, px4='EKF2_GPS_P_NOISE', ecl='gps_pos_noise')
+    vel_gate: float = param(5.0, 'Innovation gate of velocity.', unit='sigma', min=1, max=100,
+                            px4='EKF2_GPS_V_GATE', ecl='gps_vel_innov_gate')
+    pos_gate: float = param(5.0, 'Innovation gate of position.', unit='sigma', min=1, max=100,
+                            px4='EKF2_GPS_P_GATE', ecl='gps_pos_innov_gate')
+    position: Vector = param(ZERO, 'Antenna position in the body frame (FRD).', unit='m',
+                             ecl='gps_pos_body')
+    checks: GnssCheckParams = field(default_factory=GnssCheckParams)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VisionParams:
+    """External vision: odometry from a camera, lidar or wheels."""
+
+    use_position: bool = param(False, 'Fuse horizontal position.')
+    use_velocity: bool = param(False, 'Fuse velocity.')
+    use_yaw: bool = param(False, 'Fuse yaw; only where the odometry frame is the earth frame.')
+    rotate: bool = param(False, 'Rotate the odometry frame into the filter frame.')
+    delay_ms: float = param(175.0, 'Delay of the odometry against the IMU.', unit='ms', min=0,
+                            max=1000, px4='EKF2_EV_DELAY', ecl='ev_delay_ms')
+    pos_gate: float = param(5.0, 'Innovation gate of position.', unit='sigma', min=1, max=100,
+                            px4='EKF2_EVP_GATE', ecl='ev_pos_innov_gate')
+    vel_gate: float = param(3.0, 'Innovation gate of velocity.', unit='sigma', min=1, max=100,
+                            px4='EKF2_EVV_GATE', ecl='ev_vel_innov_gate')
+    position: Vector = param(ZERO, 'Sensor position in the body frame (FRD).', unit='m',
+                             ecl='ev_pos_body')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MagParams:
+    """Magnetometer."""
+
+    type: str = param('auto', 'How the magnetometer is used.', choices=MAG_TYPES)
+    delay_ms: float = param(0.0, 'Delay against the IMU.', unit='ms', min=0, max=300,
+                            px4='EKF2_MAG_DELAY', ecl='mag_delay_ms')
+    heading_noise: float = param(0.3, 'Noise of the magnetic heading.', unit='rad', min=0.01,
+                                 max=1.0, px4='EKF2_HEAD_NOISE', ecl='mag_heading_noise')
+    noise: float = param(0.05, 'Noise of one axis.', unit='G', min=0.001, max=1.0,
+                         px4='EKF2_MAG_NOISE', ecl='mag_noise')
+    heading_gate: float = param(2.6, 'Innovation gate of heading.', unit='sigma', min=1, max=100,
+                                px4='EKF2_HDG_GATE', ecl='heading_innov_gate')
+    gate: float = param(3.0, 'Innovation gate of the three axes.', unit='sigma', min=1, max=100,
+                        px4='EKF2_MAG_GATE', ecl='mag_innov_gate')
+    earth_process_noise: float = param(1e-3, 'Earth field random walk.', unit='G/s', min=0,
+                                       max=0.1, px4='EKF2_MAG_E_NOISE', ecl='mage_p_noise')
+    body_process_noise: float = param(1e-4, 'Body field random walk.', unit='G/s', min=0,
+                                      max=0.1, px4='EKF2_MAG_B_NOISE', ecl='magb_p_noise')
+    declination_deg: float = param(0.0, 'Declination where the field table is not used.',
+                                   unit='deg', min=-180, max=180, px4='EKF2_MAG_DECL',
+                                   ecl='mag_declination_deg')
+    declination_from_table: bool = param(True, 'Take the declination from the field model.')
+    declination_always: bool = param(True, 'Fuse the declination also while GNSS is used.')
+    acceleration_gate: float = param(0.5, 'Horizontal acceleration that makes yaw observable.',
+                                     unit='m/s^2', min=0, max=5, px4='EKF2_MAG_ACCLIM',
+                                     ecl='mag_acc_gate')
+    yaw_rate_gate: float = param(0.25, 'Yaw rate that makes the body field observable.',
+                                 unit='rad/s', min=0, max=5, px4='EKF2_MAG_YAWLIM',
+                                 ecl='mag_yaw_rate_gate')
+    synthesize_z: bool = param(False, 'Replace the z axis by the one the field table gives.')
+    check_strength: bool = param(False, 'Stop using a field of implausible strength.')
+    field_model: str = param('ecl_table', 'Source of declination, inclination and strength.',
+                             choices=('ecl_table', 'wmm'))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BaroParams:
+    """Barometric height."""
+
+    delay_ms: float = param(0.0, 'Delay against the IMU.', unit='ms', min=0, max=300,
+                            px4='EKF2_BARO_DELAY', ecl='baro_delay_ms')
+    noise: float = param(2.0, 'Height noise.', unit='m', min=0.01, max=15,
+                         px4='EKF2_BARO_NOISE', ecl='baro_noise')
+    gate: float = param(5.0, 'Innovation gate of barometric and GNSS height.', unit='sigma',
+                        min=1, max=100, px4='EKF2_BARO_GATE', ecl='baro_innov_gate')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HeightParams:
+    """Which sensor is the height reference."""
+
+    reference: str = param('baro', 'Primary height source.', choices=HEIGHT_REFERENCES)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TerrainParams:
+    """Height of the ground under the vehicle."""
+
+    process_noise: float = param(5.0, 'Terrain height random walk.', unit='m/s', min=0, max=50,
+                                 px4='EKF2_TERR_NOISE', ecl='terrain_p_noise')
+    gradient: float = param(0.5, 'Terrain gradient.', unit='m/m', min=0, max=10,
+                            px4='EKF2_TERR_GRAD', ecl='terrain_gradient')
+    ground_clearance: float = param(0.1, 'Height of the body origin above ground at rest.',
+                                    unit='m', min=0.01, max=10, px4='EKF2_MIN_RNG',
+                                    ecl='rng_gnd_clearance')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AidingParams:
+    """Limits of aiding and of its absence."""
+
+    pos_noaid_noise: float = param(10.0, 'Position noise without horizontal aiding.', unit='m',
+                                   min=0.5, max=100, px4='EKF2_NOAID_NOISE',
+                                   ecl='pos_noaid_noise')
+    valid_timeout: float = param(5.0, 'Dead reckoning after which the output is not valid.',
+                                 unit='s', min=0.5, max=600, px4='EKF2_NOAID_TOUT')
+    reset_timeout: float = param(7.0, 'Time without accepted aiding before a reset.', unit='s',
+                                 min=1, max=60)
+    airspeed_delay_ms: float = param(100.0, 'Delay of the airspeed sensor.', unit='ms', min=0,
+                                     max=300, px4='EKF2_ASP_DELAY', ecl='airspeed_delay_ms')
+    airspeed_threshold: float = param(2.0, 'Airspeed above which it is used; 0 = never.',
+                                      unit='m/s', min=0, max=50, px4='EKF2_ARSP_THR',
+                                      ecl='arsp_thr')
+    auxvel_delay_ms: float = param(5.0, 'Delay of the auxiliary velocity.', unit='ms', min=0,
+                                   max=300, px4='EKF2_AVEL_DELAY', ecl='auxvel_delay_ms')
+    wind_process_noise: float = param(0.1, 'Wind random walk.', unit='m/s^2', min=0, max=1.0,
+                                      px4='EKF2_WIND_NOISE', ecl='wind_vel_p_noise')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutputParams:
+    """Output predictor from the fusion horizon to now."""
+
+    vel_tau: float = param(0.25, 'Velocity tracking time constant.', unit='s', min=0.02, max=10,
+                           px4='EKF2_TAU_VEL', ecl='vel_Tau')
+    pos_tau: float = param(0.25, 'Position tracking time constant.', unit='s', min=0.02, max=10,
+                           px4='EKF2_TAU_POS', ecl='pos_Tau')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class YawEstimatorParams:
+    """EKF-GSF bank of yaw hypotheses."""
+
+    default_airspeed: float = param(15.0, 'Fixed-wing airspeed where none is measured.',
+                                    unit='m/s', min=0, max=100, px4='EKF2_GSF_TAS_DEFAULT',
+                                    ecl='EKFGSF_tas_default')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ekf2Params:
+    """Everything the EKF2 estimator can be told."""
+
+    timing: TimingParams = field(default_factory=TimingParams)
+    imu: ImuParams = field(default_factory=ImuParams)
+    gnss: GnssParams = field(default_factory=GnssParams)
+    vision: VisionParams = field(default_factory=VisionParams)
+    mag: MagParams = field(default_factory=MagParams)
+    baro: BaroParams = field(default_factory=BaroParams)
+    height: HeightParams = field(default_factory=HeightParams)
+    terrain: TerrainParams = field(default_factory=TerrainParams)
+    aiding: AidingParams = field(default_factory=AidingParams)
+    output: OutputParams = field(default_factory=OutputParams)
+    yaw_estimator: YawEstimatorParams = field(default_factory=YawEstimatorParams)

@@ -1,0 +1,189 @@
+"""Measurements as the estimators take them: NED/FRD, SI units, integer microseconds.
+
+Stamps (`time_us`) are those of the message; the estimator applies its sensor delays. Missing
+scalars and vectors are NaN, so that "not measured" can never be mistaken for zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from dataclasses import field
+from enum import Enum
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+NAN3 = np.full(3, math.nan)
+NAN3.flags.writeable = False
+NAN4 = np.full(4, math.nan)
+NAN4.flags.writeable = False
+
+
+class VelocityFrame(Enum):
+    """Frame of an external-vision velocity."""
+
+    LOCAL_FRD = 0
+    BODY_FRD = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImuSample:
+    """Inertial increments over the interval that ends at `time_us`, body FRD.
+
+    delta_angle (3,) rad, coning-corrected where the source can; delta_velocity (3,) m/s,
+    specific force times interval (at rest about -9.81 dt on z); intervals in s; `clipping` marks
+    accelerometer axes that hit their range.
+    """
+
+    time_us: int
+    delta_angle: Array
+    delta_velocity: Array
+    delta_angle_dt: float
+    delta_velocity_dt: float
+    clipping: tuple[bool, bool, bool] = (False, False, False)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GnssSample:
+    """A GNSS fix.
+
+    lat, lon deg; alt m in the datum of the source; velocity (3,) m/s NED; eph, epv 1-sigma m;
+    sacc 1-sigma m/s; fix_type 3 = 3-D; nsats, pdop None where the source has none;
+    yaw rad of the vehicle from two antennas and the angle of their axis in the body.
+    """
+
+    time_us: int
+    lat: float
+    lon: float
+    alt: float
+    eph: float
+    epv: float
+    velocity: Array = field(default_factory=lambda: NAN3)
+    sacc: float = math.nan
+    fix_type: int = 3
+    nsats: int | None = None
+    pdop: float | None = None
+    yaw: float = math.nan
+    yaw_offset: float = 0.0
+
+    @property
+    def has_velocity(self) -> bool:
+        """True where the fix carries a velocity."""
+        return math.isfinite(self.velocity[0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MagSample:
+    """Magnetic field (3,) in Gauss, body FRD."""
+
+    time_us: int
+    field: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BaroSample:
+    """Pressure altitude in m, up positive."""
+
+    time_us: int
+    altitude: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VisionSample:
+    """Pose and velocity from an odometry source ("external vision").
+
+    position (3,) m in the odometry's local frame (FRD or NED); quaternion (4,) w, x, y, z body to
+    local frame; velocity (3,) m/s in `velocity_frame`; position_var (3,) m^2; velocity_cov (3, 3)
+    (m/s)^2; angular_var rad^2. NaN position, quaternion or velocity: not measured.
+    `reset_counter` changes when the source says that its frame has jumped.
+    """
+
+    time_us: int
+    position: Array
+    quaternion: Array
+    velocity: Array = field(default_factory=lambda: NAN3)
+    position_var: Array = field(default_factory=lambda: np.full(3, 0.1))
+    velocity_cov: Array = field(default_factory=lambda: 0.1 * np.eye(3))
+    angular_var: float = 0.05
+    velocity_frame: VelocityFrame = VelocityFrame.LOCAL_FRD
+    reset_counter: int = 0
+
+    @property
+    def has_position(self) -> bool:
+        """True where a horizontal position was measured."""
+        return math.isfinite(self.position[0])
+
+    @property
+    def has_velocity(self) -> bool:
+        """True where a horizontal velocity was measured."""
+        return math.isfinite(self.velocity[0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RangeSample:
+    """Slant distance in m along the sensor axis; quality 0..100, -1 = not known."""
+
+    time_us: int
+    distance: float
+    quality: int = -1
+    min_distance: float = 0.2
+    max_distance: float = 20.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlowSample:
+    """Optical flow: angle of the scene and of the body (3,), rad over `dt` s; quality 0..255."""
+
+    time_us: int
+    flow: Array
+    gyro: Array
+    quality: int
+    dt: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AirspeedSample:
+    """True airspeed in m/s and the factor from equivalent to true airspeed."""
+
+    time_us: int
+    true_airspeed: float
+    eas2tas: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AuxVelocitySample:
+    """Velocity (3,) m/s NED against a fixed target and its variance (3,)."""
+
+    time_us: int
+    velocity: Array
+    variance: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LandedSample:
+    """Ground contact; acts at once. The two vehicle flags come with it."""
+
+    time_us: int
+    landed: bool
+    fixed_wing: bool = False
+    fuse_beta: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeadingSample:
+    """Heading of the body against true north found outside of the filter.
+
+    yaw rad, NED; variance rad^2; `time_us` is the time at which it held.
+    """
+
+    time_us: int
+    yaw: float
+    variance: float
+
+
+Sample = (
+    ImuSample | GnssSample | MagSample | BaroSample | VisionSample | RangeSample | FlowSample
+    | AirspeedSample | AuxVelocitySample | LandedSample | HeadingSample
+)
