@@ -173,9 +173,10 @@ class LandedSample:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeadingSample:
-    """Heading of the body against true north found outside of the filter.
+    """Heading of the odometry frame against true north, found from motion.
 
-    yaw rad, NED; variance rad^2; `time_us` is the time at which it held.
+    yaw rad such that v_ned = Rz(yaw) v_odometry_frd; variance rad^2; `time_us` is the time at
+    which it held.
     """
 
     time_us: int
