@@ -1,0 +1,119 @@
+"""Earth magnetic field: the reference filter's table, or the World Magnetic Model."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from importlib import import_module
+from importlib import resources
+import math
+from typing import Any
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+TABLE_STEP_DEG = 10.0
+GAUSS_PER_NANOTESLA = 1e-5
+
+
+@dataclass(frozen=True, slots=True)
+class FieldPoint:
+    """Declination and inclination in rad (east and down positive), strength in Gauss."""
+
+    declination: float
+    inclination: float
+    strength: float
+
+
+class MagneticField(Protocol):
+    """Where the field at a place comes from."""
+
+    def lookup(self, lat: float, lon: float) -> FieldPoint:
+        """Return the field at sea level at a latitude and longitude in deg."""
+
+
+def make_field(name: str, decimal_year: float) -> MagneticField:
+    """Return the model called `name` ('ecl_table' or 'wmm'); the table knows no year.
+
+    Raises ValueError on an unknown name or year, ImportError where pygeomag is missing.
+    """
+    if name == 'ecl_table':
+        return EclFieldTable.load()
+    if name == 'wmm':
+        return WmmField(decimal_year)
+    raise ValueError(f'field model {name!r}: choose one of ecl_table, wmm')
+
+
+class EclFieldTable:
+    """A grid of 10 deg interpolated bilinearly, as PX4-ECL of 2021 ships it."""
+
+    def __init__(self, values: NDArray[np.float64]) -> None:
+        """Take values (19, 37, 3): from -90, -180 deg; declination, inclination, strength."""
+        if values.shape != (19, 37, 3) or not np.all(np.isfinite(values)):
+            raise ValueError(f'field table {values.shape}: must be (19, 37, 3) finite numbers')
+        self._values = values
+
+    @classmethod
+    def load(cls) -> EclFieldTable:
+        """Read the table that ships with the package."""
+        path = resources.files('ekf_fusion_ros') / 'geo' / 'ecl_field_table.csv'
+        with path.open(encoding='utf-8') as stream:
+            rows = list(csv.reader(stream))[1:]
+        values = np.array(rows, dtype=np.float64)
+        return cls(values[:, 2:].reshape(19, 37, 3))
+
+    def lookup(self, lat: float, lon: float) -> FieldPoint:
+        """Return the field at a latitude and longitude in deg; along the longitude first.
+
+        Raises ValueError where the place is not on the earth.
+        """
+        lat, lon = _normalised(lat, lon)
+        row = min(int((lat + 90.0) // TABLE_STEP_DEG), 17)
+        column = min(int((lon + 180.0) // TABLE_STEP_DEG), 35)
+        along = (lon + 180.0) / TABLE_STEP_DEG - column
+        across = (lat + 90.0) / TABLE_STEP_DEG - row
+        cell = self._values[row:row + 2, column:column + 2]
+        edges = cell[:, 0] + along * (cell[:, 1] - cell[:, 0])
+        south, north = edges
+        return FieldPoint(*(south + across * (north - south)).tolist())
+
+
+class WmmField:
+    """World Magnetic Model through pygeomag, at sea level and one date."""
+
+    def __init__(self, decimal_year: float) -> None:
+        """Set the date; ImportError without pygeomag, ValueError outside its models' years."""
+        try:
+            pygeomag: Any = import_module('pygeomag')
+        except ImportError as error:
+            raise ImportError(
+                "mag.field_model 'wmm' needs the package pygeomag: install it, "
+                "or set mag.field_model to 'ecl_table'") from error
+        if not 2010.0 <= decimal_year < 2030.0:
+            raise ValueError(
+                f'year {decimal_year:.2f}: the World Magnetic Model covers 2010 to 2030; '
+                "set mag.field_model to 'ecl_table'")
+        model_year = int(decimal_year // 5.0) * 5
+        self._model = pygeomag.GeoMag(base_year=model_year)
+        self._year = decimal_year
+
+    def lookup(self, lat: float, lon: float) -> FieldPoint:
+        """Return the field at a latitude and longitude in deg.
+
+        Raises ValueError where the place is not on the earth.
+        """
+        lat, lon = _normalised(lat, lon)
+        result = self._model.calculate(glat=lat, glon=lon, alt=0.0, time=self._year)
+        return FieldPoint(
+            math.radians(result.d), math.radians(result.i), result.f * GAUSS_PER_NANOTESLA)
+
+
+def _normalised(lat: float, lon: float) -> tuple[float, float]:
+    if not (math.isfinite(lat) and abs(lat) <= 90.0 and math.isfinite(lon) and abs(lon) <= 360.0):
+        raise ValueError(f'latitude {lat}, longitude {lon}: not a place on the earth')
+    if lon > 180.0:
+        lon -= 360.0
+    elif lon < -180.0:
+        lon += 360.0
+    return lat, lon
