@@ -1,0 +1,57 @@
+"""Parameters of the ROS node: what it listens to, how often it works, what it publishes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ekf_fusion_ros.params.spec import param
+
+FIX_VELOCITY_TYPES = ('twist_with_covariance', 'twist')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NodeParams:
+    """The node `fuser`. Topics are renamed by remapping, not by parameters."""
+
+    use_odometry: bool = param(True, 'Subscribe to `odom` (nav_msgs/Odometry).')
+    use_fix: bool = param(True, 'Subscribe to `fix` (sensor_msgs/NavSatFix).')
+    use_imu: bool = param(False, 'Subscribe to `imu` (sensor_msgs/Imu).')
+    use_fix_velocity: bool = param(
+        False, 'Subscribe to `fix_velocity` (velocity of the receiver, ENU).')
+    fix_velocity_type: str = param(
+        'twist_with_covariance', 'Message of `fix_velocity`: TwistWithCovarianceStamped or '
+        'TwistStamped.', choices=FIX_VELOCITY_TYPES)
+    use_magnetic_field: bool = param(False, 'Subscribe to `mag` (sensor_msgs/MagneticField).')
+    use_pressure: bool = param(False, 'Subscribe to `pressure` (sensor_msgs/FluidPressure).')
+    core_rate: float = param(
+        100.0, 'Rate of the timer that runs the filter on the queued messages.', unit='Hz',
+        min=1, max=1000)
+    queue_limit: int = param(
+        5000, 'Messages that may wait for the filter; more are dropped and counted.', min=10,
+        max=1000000)
+    publish_every_update: bool = param(
+        False, 'Publish one row a filter update instead of `session.output_rate`.')
+    diagnostics_rate: float = param(
+        1.0, 'Rate of /diagnostics.', unit='Hz', min=0.1, max=10)
+    world_frame: str = param(
+        'auto', 'Frame of the published odometry: auto is `map_frame` with a fix and '
+        '`odom_frame` without; any other word is the name of the frame.')
+    map_frame: str = param('map', 'Name of the frame that is fixed to the earth.')
+    odom_frame: str = param('odom', 'Name of the frame of the odometry.')
+    base_link_frame: str = param('base_link', 'Name of the body frame of the outputs.')
+
+    @property
+    def roles(self) -> tuple[str, ...]:
+        """Roles of the topics the node listens to."""
+        chosen = (
+            ('odometry', self.use_odometry), ('fix', self.use_fix), ('imu', self.use_imu),
+            ('fix_velocity', self.use_fix_velocity), ('magnetic_field', self.use_magnetic_field),
+            ('pressure', self.use_pressure))
+        return tuple(role for role, used in chosen if used)
+
+    @property
+    def output_frame(self) -> str:
+        """Name of the frame in which the node publishes."""
+        if self.world_frame != 'auto':
+            return self.world_frame
+        return self.map_frame if self.use_fix else self.odom_frame
