@@ -1,0 +1,194 @@
+"""Translate PX4 and ECL parameters, with their bit masks and enumerations, into ours."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from collections.abc import Mapping
+from collections.abc import Sequence
+import math
+from pathlib import Path
+from typing import Any
+
+from ekf_fusion_ros.params.ekf2 import HEIGHT_REFERENCES
+from ekf_fusion_ros.params.ekf2 import MAG_TYPES
+from ekf_fusion_ros.params.ekf2 import Ekf2Params
+from ekf_fusion_ros.params.spec import leaves
+
+CHECKS = 'nsats pdop hacc vacc sacc hdrift vdrift hspeed vspeed'.split()
+
+# One entry a bit: our parameter, or in words what the bit switches where we have nothing.
+AID_BITS = (
+    'ekf2.gnss.enabled', 'optical flow', 'ekf2.imu.inhibit_accel_bias',
+    'ekf2.vision.use_position', 'ekf2.vision.use_yaw', 'drag', 'ekf2.vision.rotate',
+    'ekf2.gnss.yaw', 'ekf2.vision.use_velocity',
+)
+CHECK_BITS = tuple(f'ekf2.gnss.checks.{check}' for check in CHECKS)
+DECLINATION_BITS = (
+    'ekf2.mag.declination_from_table', 'saving the declination', 'ekf2.mag.declination_always',
+)
+EV_CONTROL_BITS = (
+    'ekf2.vision.use_position', 'vision height beside the height reference',
+    'ekf2.vision.use_velocity', 'ekf2.vision.use_yaw',
+)
+
+BIT_MASKS = {
+    'fusion_mode': AID_BITS,
+    'EKF2_AID_MASK': AID_BITS,
+    'gps_check_mask': CHECK_BITS,
+    'EKF2_GPS_CHECK': CHECK_BITS,
+    'mag_declination_source': DECLINATION_BITS,
+    'EKF2_DECL_TYPE': DECLINATION_BITS,
+    'EKF2_EV_CTRL': EV_CONTROL_BITS,
+}
+ENUMERATIONS = {
+    'vdist_sensor_type': ('ekf2.height.reference', HEIGHT_REFERENCES),
+    'EKF2_HGT_MODE': ('ekf2.height.reference', HEIGHT_REFERENCES),
+    'EKF2_HGT_REF': ('ekf2.height.reference', HEIGHT_REFERENCES),
+    'mag_fusion_type': ('ekf2.mag.type', MAG_TYPES),
+    'EKF2_MAG_TYPE': ('ekf2.mag.type', MAG_TYPES),
+}
+SWITCHES = {
+    'check_mag_strength': 'ekf2.mag.check_strength',
+    'EKF2_MAG_CHECK': 'ekf2.mag.check_strength',
+    'synthesize_mag_z': 'ekf2.mag.synthesize_z',
+    'EKF2_SYNT_MAG_Z': 'ekf2.mag.synthesize_z',
+}
+MICROSECONDS = {
+    'valid_timeout_max': 'ekf2.aiding.valid_timeout',
+    'EKF2_NOAID_TOUT': 'ekf2.aiding.valid_timeout',
+    'reset_timeout_max': 'ekf2.aiding.reset_timeout',
+}
+SECONDS = {'EKF2_REQ_GPS_H': 'ekf2.gnss.checks.health_time'}
+AXES = {
+    'EKF2_IMU_POS_': 'ekf2.imu.position',
+    'EKF2_GPS_POS_': 'ekf2.gnss.position',
+    'EKF2_EV_POS_': 'ekf2.vision.position',
+}
+
+
+def translate(foreign: Mapping[str, Any], base: Ekf2Params) -> tuple[dict[str, Any], list[str]]:
+    """Return {our dotted name: value} and what has no counterpart here, in words.
+
+    `foreign` holds PX4 (EKF2_*) or ECL names with numbers, or tuples for ECL vectors; `base`
+    gives the axes of a vector that PX4 does not mention. Raises ValueError naming the parameter
+    when an enumeration or a mask does not have that value.
+    """
+    values: dict[str, Any] = {}
+    unused: list[str] = []
+    plain = _plain_names(base)
+    vectors = {f'ekf2.{name}': value for name, value, _ in leaves(base)}
+    for name, value in foreign.items():
+        if name in BIT_MASKS:
+            _expand_mask(name, value, BIT_MASKS[name], values, unused)
+        elif name in ENUMERATIONS:
+            target, words = ENUMERATIONS[name]
+            values[target] = _chosen(name, value, words)
+        elif name in SWITCHES:
+            values[SWITCHES[name]] = _whole(name, value) != 0
+        elif name in MICROSECONDS:
+            values[MICROSECONDS[name]] = _scalar(name, value) * 1e-6
+        elif name[:-1] in AXES and name[-1] in 'XYZ':
+            target = AXES[name[:-1]]
+            vector = list(values.get(target, vectors[target]))
+            vector['XYZ'.index(name[-1])] = _scalar(name, value)
+            values[target] = tuple(vector)
+        elif name in plain:
+            values[plain[name]] = value
+        else:
+            unused.append(name)
+    return values, unused
+
+
+def _plain_names(base: Ekf2Params) -> dict[str, str]:
+    names = dict(SECONDS)
+    for name, _, spec in leaves(base, 'ekf2.'):
+        names.update({foreign: name for foreign in (spec.px4, spec.ecl) if foreign})
+    return names
+
+
+def _expand_mask(
+    name: str, value: Any, bits: Sequence[str], values: dict[str, Any], unused: list[str]
+) -> None:
+    mask = _whole(name, value)
+    if mask < 0:
+        raise ValueError(f'{name} = {value}: a bit mask is not negative')
+    for index in range(max(len(bits), mask.bit_length())):
+        is_set = bool(mask >> index & 1)
+        target = bits[index] if index < len(bits) else 'not a bit that is known'
+        if target.startswith('ekf2.'):
+            values[target] = is_set
+        elif is_set:
+            unused.append(f'{name} bit {index} ({target})')
+
+
+def _chosen(name: str, value: Any, words: Sequence[str]) -> str:
+    index = _whole(name, value)
+    if not 0 <= index < len(words):
+        options = ', '.join(f'{i} {word}' for i, word in enumerate(words))
+        raise ValueError(f'{name} = {value}: choose one of {options}')
+    return words[index]
+
+
+def _scalar(name: str, value: Any) -> float:
+    if isinstance(value, tuple) or not math.isfinite(value):
+        raise ValueError(f'{name} = {value}: expected one finite number')
+    return float(value)
+
+
+def _whole(name: str, value: Any) -> int:
+    number = _scalar(name, value)
+    if not number.is_integer():
+        raise ValueError(f'{name} = {value}: expected an integer')
+    return int(number)
+
+
+def read_px4(path: Path) -> tuple[dict[str, float], list[str]]:
+    """Return the EKF2 parameters of a PX4 .params file and what else it holds, in words.
+
+    Lines are `vehicle component NAME value type`, `#` starts a comment. Raises ValueError naming
+    file and line.
+    """
+    values: dict[str, float] = {}
+    others = 0
+    for number, line in _lines(path):
+        fields = line.split()
+        if len(fields) != 5:
+            raise ValueError(f'{path} line {number}: expected "vehicle component NAME value type"')
+        if fields[2].startswith('EKF2_'):
+            values[fields[2]] = _number(path, number, fields[3])
+        else:
+            others += 1
+    return values, [f'{others} parameters of other PX4 modules'] if others else []
+
+
+def read_ecl(path: Path) -> dict[str, Any]:
+    """Return {name: number or tuple} of `name=value` lines with ECL names; vectors are x;y;z.
+
+    Raises ValueError naming file and line.
+    """
+    values: dict[str, Any] = {}
+    for number, line in _lines(path):
+        name, equals, text = line.partition('=')
+        if not equals:
+            raise ValueError(f'{path} line {number}: expected name=value')
+        parts = tuple(_number(path, number, part) for part in text.split(';'))
+        values[name.strip()] = parts[0] if len(parts) == 1 else parts
+    return values
+
+
+def _lines(path: Path) -> Iterator[tuple[int, str]]:
+    try:
+        text = path.read_text(encoding='utf-8')
+    except UnicodeDecodeError:
+        raise ValueError(f'{path}: not a text file') from None
+    for number, line in enumerate(text.splitlines(), start=1):
+        content = line.partition('#')[0].strip()
+        if content:
+            yield number, content
+
+
+def _number(path: Path, line: int, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f'{path} line {line}: {text.strip()!r} is not a number') from None
