@@ -1,0 +1,1 @@
+"""Numeric hot paths: functions on preallocated arrays that numba compiles when it is there."""

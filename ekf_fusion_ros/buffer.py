@@ -1,0 +1,56 @@
+"""The delayed FIFO: samples wait here until the fusion horizon has passed them."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Generic
+from typing import TypeVar
+
+T = TypeVar('T')
+
+MAX_AGE_US = 100_000
+"""A sample older than this against the horizon is too late to be fused."""
+
+
+class SampleBuffer(Generic[T]):
+    """FIFO of fixed capacity, ordered by time.
+
+    `newest` stays readable after it has been taken out, but its time is then 0: whoever asks
+    "is the newest sample recent" hears "no" until the next one arrives.
+    """
+
+    def __init__(self, capacity: int) -> None:
+        """Hold at most `capacity` samples; pushing past that drops the oldest."""
+        self._waiting: deque[tuple[int, T]] = deque(maxlen=capacity)
+        self.newest: T | None = None
+        self.newest_time_us = 0
+        self.missed = 0
+
+    def __len__(self) -> int:
+        """Return the number of waiting samples."""
+        return len(self._waiting)
+
+    def push(self, time_us: int, sample: T) -> None:
+        """Add the newest sample."""
+        if len(self._waiting) == self._waiting.maxlen:
+            self.missed += 1
+        self._waiting.append((time_us, sample))
+        self.newest = sample
+        self.newest_time_us = time_us
+
+    def pop_first_older_than(self, time_us: int) -> tuple[int, T] | None:
+        """Take the newest sample with t <= time_us < t + 100 ms, and drop all before it."""
+        waiting = self._waiting
+        if not waiting or waiting[0][0] > time_us:
+            return None
+        for index in range(len(waiting) - 1, -1, -1):
+            stamp, sample = waiting[index]
+            if stamp <= time_us < stamp + MAX_AGE_US:
+                for _ in range(index):
+                    waiting.popleft()
+                    self.missed += 1
+                waiting.popleft()
+                if not waiting:
+                    self.newest_time_us = 0
+                return stamp, sample
+        return None

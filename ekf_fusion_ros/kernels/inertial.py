@@ -1,0 +1,98 @@
+"""Inertial increments: down-sampling to the filter rate and vibration metrics."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ekf_fusion_ros.kernels.compile import kernel
+from ekf_fusion_ros.mathlib.rotation import quat_from_rotation_vector
+from ekf_fusion_ros.mathlib.rotation import quat_multiply
+from ekf_fusion_ros.mathlib.rotation import quat_normalise
+from ekf_fusion_ros.mathlib.rotation import rotation_vector_from_quat
+
+Array = NDArray[np.float64]
+
+TARGET_DT = np.float32(10.0) * np.float32(0.001)
+"""Filter period in s. Single precision: which raw sample completes a filter period hangs on
+ties of this sum, and agreement with the reference filter needs the same ties."""
+
+ADJUST_GAIN = np.float32(0.01)
+ADJUST_LIMIT = TARGET_DT / np.float32(2.0)
+
+
+@kernel
+def accumulate_imu(
+    delta_angle: Array, delta_velocity: Array, angle_dt: float, velocity_dt: float,
+    quat: Array, velocity: Array, clock: NDArray[np.float32], sums: Array, out: Array,
+) -> bool:
+    """Add one raw sample; True when `out` (8,) holds a complete filter period.
+
+    quat (4,) and velocity (3,) accumulate rotation and velocity in the newest body frame; clock
+    (2,) float32 holds the collected time and its adjustment; sums (1,) the velocity interval. out
+    is delta angle (3), delta velocity (3) and their intervals. The velocity of one sample is taken
+    to act half way through its rotation, which removes the sculling error to first order
+    (P. G. Savage, "Strapdown inertial navigation integration algorithm design", 1998).
+    """
+    step = quat_from_rotation_vector(delta_angle)
+    quat[:] = quat_normalise(quat_multiply(quat, step))
+    # v' = R(step)^T v, by the vector part of the quaternion
+    w, x, y, z = step[0], -step[1], -step[2], -step[3]
+    for turn in range(2):
+        if turn == 0:
+            vx, vy, vz = velocity[0], velocity[1], velocity[2]
+        else:
+            vx, vy, vz = delta_velocity[0], delta_velocity[1], delta_velocity[2]
+        tx = 2.0 * (y * vz - z * vy)
+        ty = 2.0 * (z * vx - x * vz)
+        tz = 2.0 * (x * vy - y * vx)
+        rx = vx + w * tx + y * tz - z * ty
+        ry = vy + w * ty + z * tx - x * tz
+        rz = vz + w * tz + x * ty - y * tx
+        if turn == 0:
+            velocity[0], velocity[1], velocity[2] = rx, ry, rz
+        else:
+            velocity[0] += 0.5 * (vx + rx)
+            velocity[1] += 0.5 * (vy + ry)
+            velocity[2] += 0.5 * (vz + rz)
+    clock[0] += np.float32(angle_dt)
+    sums[0] += velocity_dt
+    if clock[0] < TARGET_DT - clock[1]:
+        return False
+    adjusted = clock[1] + ADJUST_GAIN * (clock[0] - TARGET_DT)
+    clock[1] = min(max(adjusted, -ADJUST_LIMIT), ADJUST_LIMIT)
+    out[0:3] = rotation_vector_from_quat(quat)
+    out[3:6] = velocity
+    out[6] = clock[0]
+    out[7] = sums[0]
+    quat[:] = 0.0
+    quat[0] = 1.0
+    velocity[:] = 0.0
+    clock[0] = 0.0
+    sums[0] = 0.0
+    return True
+
+
+@kernel
+def update_vibration(
+    delta_angle: Array, delta_velocity: Array, previous: Array, metrics: Array,
+) -> None:
+    """Low-pass coning |a x a'|, |a - a'| (rad) and |v - v'| (m/s) of successive samples.
+
+    previous (6,) holds the sample before, metrics (3,) the filtered values.
+    """
+    ax, ay, az = delta_angle[0], delta_angle[1], delta_angle[2]
+    bx, by, bz = previous[0], previous[1], previous[2]
+    cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    coning = math.sqrt(cx * cx + cy * cy + cz * cz)
+    angle = math.sqrt((ax - bx) ** 2 + (ay - by) ** 2 + (az - bz) ** 2)
+    velocity = math.sqrt(
+        (delta_velocity[0] - previous[3]) ** 2 + (delta_velocity[1] - previous[4]) ** 2
+        + (delta_velocity[2] - previous[5]) ** 2)
+    metrics[0] = 0.99 * metrics[0] + 0.01 * coning
+    metrics[1] = 0.99 * metrics[1] + 0.01 * angle
+    metrics[2] = 0.99 * metrics[2] + 0.01 * velocity
+    previous[0:3] = delta_angle
+    previous[3:6] = delta_velocity

@@ -1,0 +1,84 @@
+"""Full-rate strapdown of the output predictor and its correction towards the filter.
+
+out (10,) is quaternion, velocity, position of the IMU; history (n, 10) the same for the last filter
+periods. A complementary filter: A. Khosravian et al., "Recursive attitude estimation in the presence of
+multi-rate and multi-delay vector measurements", 2015.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ekf_fusion_ros.kernels.compile import kernel
+from ekf_fusion_ros.kernels.prediction import GRAVITY
+from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
+from ekf_fusion_ros.mathlib.rotation import quat_from_rotation_vector
+from ekf_fusion_ros.mathlib.rotation import quat_multiply
+from ekf_fusion_ros.mathlib.rotation import quat_normalise
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def propagate_output(
+    out: Array, rot: Array, delta_angle: Array, delta_velocity: Array, angle_dt: float,
+    velocity_dt: float, x: Array, bias_scale: float, correction: Array, yaw: Array,
+) -> None:
+    """Advance out (10,) and rot (3, 3) by one raw IMU sample, in place.
+
+    bias_scale turns biases per filter period into biases per raw sample; correction (3,) rad;
+    yaw (2,) accumulates the turn about the vertical and low-passes its rate.
+    """
+    angle = np.empty(3)
+    spin = 0.0
+    for i in range(3):
+        angle[i] = delta_angle[i] - x[10 + i] * bias_scale + correction[i]
+        spin += angle[i] * rot[2, i]
+    yaw[0] += spin
+    yaw[1] = 0.95 * yaw[1] + 0.05 * spin / angle_dt
+    out[0:4] = quat_normalise(quat_multiply(out[0:4], quat_from_rotation_vector(angle)))
+    rot[:, :] = matrix_from_quat(out[0:4])
+    dv0 = delta_velocity[0] - x[13] * bias_scale
+    dv1 = delta_velocity[1] - x[14] * bias_scale
+    dv2 = delta_velocity[2] - x[15] * bias_scale
+    for i in range(3):
+        increment = rot[i, 0] * dv0 + rot[i, 1] * dv1 + rot[i, 2] * dv2
+        if i == 2:
+            increment += GRAVITY * velocity_dt
+        before = out[4 + i]
+        out[4 + i] = before + increment
+        out[7 + i] += 0.5 * (before + out[4 + i]) * velocity_dt
+
+
+@kernel
+def attitude_error(q: Array, oldest: Array) -> Array:
+    """Return the small rotation (3,) in rad that takes the oldest output to the filter attitude."""
+    w, x, y, z = q[0], -q[1], -q[2], -q[3]
+    error = quat_normalise(quat_multiply(np.array((w, x, y, z)), oldest))
+    scale = -2.0
+    if error[0] < 0.0:
+        scale = 2.0
+    return scale * error[1:4]
+
+
+@kernel
+def correct_output(
+    out: Array, history: Array, oldest: int, x: Array, integral: Array, vel_gain: float,
+    pos_gain: float, errors: Array,
+) -> None:
+    """Shift velocity and position of the whole history towards the filter (PI), in place.
+
+    integral (6,) of the velocity and position errors; errors (2,) receives their norms.
+    """
+    norm = np.zeros(2)
+    for i in range(6):
+        error = x[4 + i] - history[oldest, 4 + i]
+        integral[i] += error
+        gain = vel_gain if i < 3 else pos_gain
+        shift = error * gain + integral[i] * gain * gain * 0.1
+        history[:, 4 + i] += shift
+        out[4 + i] += shift
+        norm[i // 3] += error * error
+    errors[0] = np.sqrt(norm[0])
+    errors[1] = np.sqrt(norm[1])

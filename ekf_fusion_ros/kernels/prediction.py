@@ -1,0 +1,168 @@
+"""State and covariance prediction over one delayed inertial sample.
+
+State order: quaternion body to earth (0-3), velocity NED (4-6), position NED (7-9), delta-angle bias
+(10-12), delta-velocity bias (13-15), earth field (16-18), body field (19-21), wind NE (22-23).
+Process model (Sola 2017, section 4, with the quaternion itself as state):
+    q+ = q [1, (da - ba) / 2],   v+ = v + R(q) (dv - bv) + g dt,   p+ = p + v dt.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ekf_fusion_ros.kernels.compile import kernel
+from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
+from ekf_fusion_ros.mathlib.rotation import quat_from_rotation_vector
+from ekf_fusion_ros.mathlib.rotation import quat_multiply
+from ekf_fusion_ros.mathlib.rotation import quat_normalise
+
+Array = NDArray[np.float64]
+GRAVITY = 9.80665
+
+
+@kernel
+def predict_state(x: Array, rot: Array, imu: Array, earth_rate: Array, accel_lpf: Array) -> None:
+    """Strapdown of x (24,) and the cached rotation (3, 3) over imu (8,), in place.
+
+    earth_rate (3,) rad/s NED. accel_lpf (2,) is a leaky sum of the horizontal velocity increments,
+    m/s^2 for a time constant of 1 s.
+    """
+    correction = np.empty(3)
+    for i in range(3):
+        turned = (rot[0, i] * earth_rate[0] + rot[1, i] * earth_rate[1]
+                  + rot[2, i] * earth_rate[2])
+        correction[i] = imu[i] - x[10 + i] - turned * imu[6]
+    x[0:4] = quat_normalise(quat_multiply(x[0:4], quat_from_rotation_vector(correction)))
+    rot[:, :] = matrix_from_quat(x[0:4])
+    dv0, dv1, dv2 = imu[3] - x[13], imu[4] - x[14], imu[5] - x[15]
+    dt = imu[7]
+    decay = 1.0 - dt
+    for i in range(3):
+        increment = rot[i, 0] * dv0 + rot[i, 1] * dv1 + rot[i, 2] * dv2
+        if i < 2:
+            accel_lpf[i] = accel_lpf[i] * decay + increment
+        else:
+            increment += GRAVITY * dt
+        previous = x[4 + i]
+        x[4 + i] = previous + increment
+        x[7 + i] += 0.5 * (previous + x[4 + i]) * dt
+
+
+@kernel
+def limit_state(x: Array, dt: float, accel_bias_limit: float) -> None:
+    """Clamp x (24,) to what is physically possible; dt is the mean filter period in s."""
+    gyro_limit = math.radians(20.0) * dt
+    accel_limit = accel_bias_limit * dt
+    for i in range(24):
+        if i < 4:
+            limit = 1.0
+        elif i < 7:
+            limit = 1e3
+        elif i < 10:
+            limit = 1e6
+        elif i < 13:
+            limit = gyro_limit
+        elif i < 16:
+            limit = accel_limit
+        elif i < 19:
+            limit = 1.0
+        elif i < 22:
+            limit = 0.5
+        else:
+            limit = 100.0
+        if x[i] > limit:
+            x[i] = limit
+        elif x[i] < -limit:
+            x[i] = -limit
+
+
+@kernel
+def fill_transition(q: Array, da: Array, dv: Array, dt: float, f: Array) -> None:
+    """Write the rows of F that are not identity into f (10, 24), zeroed elsewhere before.
+
+    q (4,) is the predicted attitude, da and dv (3,) the bias-corrected increments. R(q) is
+    differentiated in its unit-norm form (diagonal 1 - 2(..)), the one used by the prediction.
+    """
+    q0, q1, q2, q3 = q[0], q[1], q[2], q[3]
+    a, b, c = 0.5 * da[0], 0.5 * da[1], 0.5 * da[2]
+    f[0, 0], f[0, 1], f[0, 2], f[0, 3] = 1.0, -a, -b, -c
+    f[1, 0], f[1, 1], f[1, 2], f[1, 3] = a, 1.0, c, -b
+    f[2, 0], f[2, 1], f[2, 2], f[2, 3] = b, -c, 1.0, a
+    f[3, 0], f[3, 1], f[3, 2], f[3, 3] = c, b, -a, 1.0
+    f[0, 10], f[0, 11], f[0, 12] = 0.5 * q1, 0.5 * q2, 0.5 * q3
+    f[1, 10], f[1, 11], f[1, 12] = -0.5 * q0, 0.5 * q3, -0.5 * q2
+    f[2, 10], f[2, 11], f[2, 12] = -0.5 * q3, -0.5 * q0, 0.5 * q1
+    f[3, 10], f[3, 11], f[3, 12] = 0.5 * q2, -0.5 * q1, -0.5 * q0
+    x, y, z = dv[0], dv[1], dv[2]
+    f[4, 0] = 2.0 * (q2 * z - q3 * y)
+    f[4, 1] = 2.0 * (q2 * y + q3 * z)
+    f[4, 2] = 2.0 * (q1 * y + q0 * z) - 4.0 * q2 * x
+    f[4, 3] = 2.0 * (q1 * z - q0 * y) - 4.0 * q3 * x
+    f[5, 0] = 2.0 * (q3 * x - q1 * z)
+    f[5, 1] = 2.0 * (q2 * x - q0 * z) - 4.0 * q1 * y
+    f[5, 2] = 2.0 * (q1 * x + q3 * z)
+    f[5, 3] = 2.0 * (q0 * x + q2 * z) - 4.0 * q3 * y
+    f[6, 0] = 2.0 * (q1 * y - q2 * x)
+    f[6, 1] = 2.0 * (q3 * x + q0 * y) - 4.0 * q1 * z
+    f[6, 2] = 2.0 * (q3 * y - q0 * x) - 4.0 * q2 * z
+    f[6, 3] = 2.0 * (q1 * x + q2 * y)
+    rot = matrix_from_quat(q)
+    for i in range(3):
+        f[4 + i, 4 + i] = 1.0
+        f[7 + i, 7 + i] = 1.0
+        f[7 + i, 4 + i] = dt
+        for j in range(3):
+            f[4 + i, 13 + j] = -rot[i, j]
+
+
+@kernel
+def predict_covariance(
+    p: Array, f: Array, angle_var: float, velocity_var: Array, noise: Array,
+    inhibited: Array, saved: Array, mag_active: bool, wind_active: bool,
+) -> None:
+    """P <- F P F' + G Q G' + N in place.
+
+    p (24, 24); f (10, 24) from fill_transition; angle_var rad^2 and velocity_var (3,) (m/s)^2 of the
+    increments; noise (24,) the additive process noise. inhibited (3,) marks accelerometer axes whose
+    bias is not estimated: their rows stay zero with the saved (3,) variance. Inactive magnetic
+    and wind blocks are zero.
+    """
+    if not mag_active:
+        noise[16:22] = 0.0
+    if not wind_active:
+        noise[22:24] = 0.0
+    frozen = p[7, 7] + p[8, 8] > 1e4
+    top = f @ p
+    block = top @ f.T
+    # G is minus the bias columns of F: the biases act on the same increments
+    g_angle = f[0:4, 10:13]
+    g_velocity = f[4:7, 13:16]
+    for i in range(4):
+        for j in range(4):
+            s = 0.0
+            for k in range(3):
+                s += g_angle[i, k] * g_angle[j, k]
+            block[i, j] += angle_var * s
+    for i in range(3):
+        for j in range(3):
+            s = 0.0
+            for k in range(3):
+                s += g_velocity[i, k] * g_velocity[j, k] * velocity_var[k]
+            block[4 + i, 4 + j] += s
+    kept = p[7:9, :].copy()
+    p[0:10, 10:24] = top[:, 10:24]
+    p[10:24, 0:10] = top[:, 10:24].T
+    p[0:10, 0:10] = block
+    if frozen:
+        p[7:9, :] = kept
+        p[:, 7:9] = kept.T
+    for i in range(10, 24):
+        p[i, i] += noise[i]
+    for k in range(3):
+        if inhibited[k] != 0.0:
+            p[13 + k, :] = 0.0
+            p[:, 13 + k] = 0.0
+            p[13 + k, 13 + k] = saved[k]

@@ -1,0 +1,109 @@
+"""Covariance limits and the scalar measurement update.
+
+Sequential scalar updates (e.g. D. Simon, "Optimal State Estimation", 2006, section 6.1):
+    S = H P H' + R,  K = P H' / S,  P <- P - K H P,  x <- x - K (predicted - measured).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ekf_fusion_ros.kernels.compile import kernel
+from ekf_fusion_ros.mathlib.rotation import quat_normalise
+
+Array = NDArray[np.float64]
+
+VARIANCE_MIN = np.array([0.0] * 4 + [1e-6] * 6 + [0.0] * 3)
+VARIANCE_MAX = np.array([1.0] * 4 + [1e6] * 6 + [1.0] * 3)
+ACCEL_BIAS_VARIANCE_FLOOR = 5e-8
+ACCEL_BIAS_VARIANCE_SAFE = 1e-9
+
+
+@kernel
+def limit_covariance(
+    p: Array, inhibited: Array, accel_bias_var_max: float, mag_active: bool, wind_active: bool,
+) -> None:
+    """Clamp the variances, make P symmetric, keep inactive blocks at zero, in place.
+
+    The accelerometer-bias variances are kept within a ratio of 100; one that has collapsed
+    decorrelates all three. accel_bias_var_max in (m/s)^2 per period.
+    """
+    diagonal = p.reshape(576)[::25]
+    diagonal[0:13] = np.minimum(np.maximum(diagonal[0:13], VARIANCE_MIN), VARIANCE_MAX)
+    p[:, :] = 0.5 * (p + p.T)
+    largest = ACCEL_BIAS_VARIANCE_SAFE
+    collapsed = False
+    free = 0
+    for k in range(3):
+        if inhibited[k] == 0.0:
+            free += 1
+            variance = p[13 + k, 13 + k]
+            if variance > largest:
+                largest = variance
+            elif variance < ACCEL_BIAS_VARIANCE_SAFE:
+                collapsed = True
+    if free > 0:
+        lower = max(0.01 * largest, ACCEL_BIAS_VARIANCE_FLOOR)
+        for k in range(3):
+            if inhibited[k] == 0.0:
+                p[13 + k, 13 + k] = min(max(p[13 + k, 13 + k], lower), accel_bias_var_max)
+        if collapsed:
+            for k in range(13, 16):
+                variance = p[k, k]
+                p[k, :] = 0.0
+                p[:, k] = 0.0
+                p[k, k] = variance
+    if mag_active:
+        for k in range(16, 22):
+            p[k, k] = min(max(p[k, k], 0.0), 1.0)
+    else:
+        p[16:22, :] = 0.0
+        p[:, 16:22] = 0.0
+    if wind_active:
+        for k in range(22, 24):
+            p[k, k] = min(max(p[k, k], 0.0), 1e6)
+    else:
+        p[22:24, :] = 0.0
+        p[:, 22:24] = 0.0
+
+
+@kernel
+def apply_update(
+    p: Array, x: Array, gain: Array, hp: Array, innovation: float, inhibited: Array,
+    accel_bias_var_max: float, mag_active: bool, wind_active: bool,
+) -> bool:
+    """Subtract gain x hp from P and gain x innovation from x; False if P would turn negative.
+
+    gain (24,) may have been cut by the caller; hp (24,) = H P. On failure the rows of the states
+    that would turn negative are zeroed and nothing else is changed.
+    """
+    khp = np.outer(gain, hp)
+    drop = khp.reshape(576)[::25]
+    diagonal = p.reshape(576)[::25]
+    healthy = True
+    if np.any(diagonal < drop):
+        for i in range(24):
+            if p[i, i] < khp[i, i]:
+                p[i, :] = 0.0
+                p[:, i] = 0.0
+                healthy = False
+    if not healthy:
+        return False
+    p -= khp
+    limit_covariance(p, inhibited, accel_bias_var_max, mag_active, wind_active)
+    x -= gain * innovation
+    x[0:4] = quat_normalise(x[0:4])
+    return True
+
+
+@kernel
+def apply_direct(
+    p: Array, x: Array, state: int, variance: float, innovation: float, inhibited: Array,
+    accel_bias_var_max: float, mag_active: bool, wind_active: bool,
+) -> bool:
+    """Update with an observation of one state whose innovation variance is given."""
+    gain = p[:, state] / variance
+    hp = p[state, :].copy()
+    return apply_update(p, x, gain, hp, innovation, inhibited, accel_bias_var_max, mag_active,
+                        wind_active)

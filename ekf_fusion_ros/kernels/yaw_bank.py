@@ -1,0 +1,145 @@
+"""Bank of attitude references and 3-state (v_N, v_E, yaw) filters of the EKF-GSF yaw estimator.
+
+Arrays hold one entry per model: rot (n, 3, 3) body to earth, bias (n, 3) rad/s, state (n, 3),
+cov (n, 3, 3), weight (n,). Complementary filter after R. Mahony et al., "Nonlinear complementary
+filters on the special orthogonal group", 2008; Gaussian sum after D. Alspach and H. Sorenson, 1972.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ekf_fusion_ros.kernels.compile import kernel
+
+Array = NDArray[np.float64]
+
+BIAS_GAIN = 0.04
+BIAS_LIMIT = 0.05
+BIAS_LEARN_RATE_MAX = 0.175
+ACCEL_NOISE = 2.0
+GYRO_NOISE = 0.1
+VARIANCE_FLOOR = 1e-6
+CLIP_SIGMA = 5.0
+
+
+@kernel
+def predict_attitudes(
+    rot: Array, bias: Array, imu: Array, accel: Array, gain: float, airspeed: float,
+) -> None:
+    """Turn every rot by the delta angle of imu (8,) and lean it towards the filtered accel (3,)."""
+    norm = math.sqrt(accel[0] ** 2 + accel[1] ** 2 + accel[2] ** 2)
+    dt = imu[6]
+    rate_dt = max(dt, 1e-3)
+    for m in range(rot.shape[0]):
+        wx = imu[0] / rate_dt - bias[m, 0]
+        wy = imu[1] / rate_dt - bias[m, 1]
+        wz = imu[2] / rate_dt - bias[m, 2]
+        tx = ty = tz = 0.0
+        if gain > 0.0:
+            ax, ay, az = accel[0], accel[1], accel[2]
+            if airspeed > 0.0:
+                ay -= airspeed * wz
+                az += airspeed * wy
+            gx, gy, gz = rot[m, 2, 0], rot[m, 2, 1], rot[m, 2, 2]
+            scale = gain / norm
+            tx = (gy * az - gz * ay) * scale
+            ty = (gz * ax - gx * az) * scale
+            tz = (gx * ay - gy * ax) * scale
+        if math.sqrt(wx * wx + wy * wy + wz * wz) < BIAS_LEARN_RATE_MAX:
+            step = BIAS_GAIN * dt
+            bias[m, 0] = min(max(bias[m, 0] - tx * step, -BIAS_LIMIT), BIAS_LIMIT)
+            bias[m, 1] = min(max(bias[m, 1] - ty * step, -BIAS_LIMIT), BIAS_LIMIT)
+            bias[m, 2] = min(max(bias[m, 2] - tz * step, -BIAS_LIMIT), BIAS_LIMIT)
+        dx = imu[0] + (tx - bias[m, 0]) * dt
+        dy = imu[1] + (ty - bias[m, 1]) * dt
+        dz = imu[2] + (tz - bias[m, 2]) * dt
+        for i in range(3):
+            a, b, c = rot[m, i, 0], rot[m, i, 1], rot[m, i, 2]
+            a2 = a + b * dz - c * dy
+            b2 = b + c * dx - a * dz
+            c2 = c + a * dy - b * dx
+            unit = 1.5 - 0.5 * (a2 * a2 + b2 * b2 + c2 * c2)
+            rot[m, i, 0], rot[m, i, 1], rot[m, i, 2] = a2 * unit, b2 * unit, c2 * unit
+
+
+@kernel
+def predict_models(rot: Array, state: Array, cov: Array, imu: Array) -> None:
+    """Propagate velocity and yaw of every model with the velocity increment of imu (8,)."""
+    velocity_var = (ACCEL_NOISE * imu[7]) ** 2
+    yaw_var = (GYRO_NOISE * imu[6]) ** 2
+    for m in range(rot.shape[0]):
+        if abs(rot[m, 2, 0]) < abs(rot[m, 2, 1]):
+            yaw = math.atan2(rot[m, 1, 0], rot[m, 0, 0])
+        else:
+            yaw = math.atan2(-rot[m, 0, 1], rot[m, 1, 1])
+        dn = rot[m, 0, 0] * imu[3] + rot[m, 0, 1] * imu[4] + rot[m, 0, 2] * imu[5]
+        de = rot[m, 1, 0] * imu[3] + rot[m, 1, 1] * imu[4] + rot[m, 1, 2] * imu[5]
+        state[m, 0] += dn
+        state[m, 1] += de
+        state[m, 2] = yaw
+        # d(dv_NE)/d(yaw) = (-de, dn): the increments rotate with the yaw error
+        p02 = cov[m, 0, 2] - de * cov[m, 2, 2]
+        p12 = cov[m, 1, 2] + dn * cov[m, 2, 2]
+        p00 = cov[m, 0, 0] - de * (cov[m, 0, 2] + p02)
+        p11 = cov[m, 1, 1] + dn * (cov[m, 1, 2] + p12)
+        p01 = cov[m, 0, 1] - de * cov[m, 1, 2] + dn * p02
+        cov[m, 0, 0] = max(p00 + velocity_var, VARIANCE_FLOOR)
+        cov[m, 1, 1] = max(p11 + velocity_var, VARIANCE_FLOOR)
+        cov[m, 2, 2] = max(cov[m, 2, 2] + yaw_var, VARIANCE_FLOOR)
+        cov[m, 0, 1] = cov[m, 1, 0] = p01
+        cov[m, 0, 2] = cov[m, 2, 0] = p02
+        cov[m, 1, 2] = cov[m, 2, 1] = p12
+
+
+@kernel
+def correct_models(
+    rot: Array, state: Array, cov: Array, velocity: Array, accuracy: float, density: Array,
+) -> bool:
+    """Fuse a NE velocity (2,) into every model; False if any S was singular.
+
+    density (n,) receives the likelihood of the unclipped innovation. The innovation is shortened to
+    5 sigma for the state correction.
+    """
+    noise = max(accuracy, 0.01) ** 2
+    good = True
+    for m in range(rot.shape[0]):
+        in_ = state[m, 0] - velocity[0]
+        ie = state[m, 1] - velocity[1]
+        s00 = cov[m, 0, 0] + noise
+        s11 = cov[m, 1, 1] + noise
+        s01 = cov[m, 0, 1]
+        det = s00 * s11 - s01 * s01
+        if abs(det) < 1e-6:
+            good = False
+            continue
+        i00, i11, i01 = s11 / det, s00 / det, -s01 / det
+        chi2 = i00 * in_ * in_ + 2.0 * i01 * in_ * ie + i11 * ie * ie
+        density[m] = math.exp(-0.5 * chi2) / (2.0 * math.pi * math.sqrt(abs(det)))
+        scale = 1.0
+        if chi2 > CLIP_SIGMA ** 2:
+            scale = CLIP_SIGMA / math.sqrt(chi2)
+        before = cov[m].copy()
+        yaw_change = 0.0
+        for i in range(3):
+            ki0 = before[i, 0] * i00 + before[i, 1] * i01
+            ki1 = before[i, 0] * i01 + before[i, 1] * i11
+            change = -(ki0 * in_ + ki1 * ie) * scale
+            state[m, i] += change
+            if i == 2:
+                yaw_change = change
+            for j in range(3):
+                cov[m, i, j] = before[i, j] - ki0 * before[0, j] - ki1 * before[1, j]
+        for i in range(3):
+            for j in range(i):
+                mean = 0.5 * (cov[m, i, j] + cov[m, j, i])
+                cov[m, i, j] = cov[m, j, i] = mean
+            cov[m, i, i] = max(cov[m, i, i], VARIANCE_FLOOR)
+        c, s = math.cos(yaw_change), math.sin(yaw_change)
+        for j in range(3):
+            a, b = rot[m, 0, j], rot[m, 1, j]
+            rot[m, 0, j] = a * c - b * s
+            rot[m, 1, j] = a * s + b * c
+    return good
