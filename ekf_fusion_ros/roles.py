@@ -1,0 +1,78 @@
+"""What each role brings, and the aiding that a set of roles calls for."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+from typing import TYPE_CHECKING
+from typing import Any
+
+if TYPE_CHECKING:
+    from ekf_fusion_ros.params.tree import Params
+
+ODOMETRY = 'odometry'
+FIX = 'fix'
+FIX_VELOCITY = 'fix_velocity'
+IMU = 'imu'
+MAGNETIC_FIELD = 'magnetic_field'
+PRESSURE = 'pressure'
+
+SUPPORTED = (ODOMETRY, FIX, FIX_VELOCITY, IMU, MAGNETIC_FIELD, PRESSURE)
+LATER = ('range', 'flow', 'airspeed', 'landed', 'gps_heading')
+
+
+def check_roles(roles: Collection[str]) -> None:
+    """Raise ValueError for a set of roles that cannot be fused."""
+    for role in roles:
+        if role in LATER:
+            raise ValueError(f'role {role} is not supported by this version: leave it out')
+        if role not in SUPPORTED:
+            raise ValueError(f'unknown role {role!r}: choose of {", ".join(SUPPORTED)}')
+    if IMU not in roles and ODOMETRY not in roles:
+        raise ValueError('no inertial input: give an odometry or an imu topic')
+    if FIX_VELOCITY in roles and FIX not in roles:
+        raise ValueError('role fix_velocity needs a fix topic beside it')
+
+
+def configure(params: Params, roles: Collection[str]) -> Params:
+    """Return the parameters in effect for these roles.
+
+    Only values of `params.ekf2` that stand at their default are changed, so that a value chosen
+    by the user wins.
+    """
+    check_roles(roles)
+    if not params.session.automatic_aiding:
+        return params
+    ekf2 = params.ekf2
+    for group, wanted in _wanted(params, roles).items():
+        current = getattr(ekf2, group)
+        default = type(current)()
+        changes = {name: value for name, value in wanted.items()
+                   if getattr(current, name) == getattr(default, name)}
+        ekf2 = replace(ekf2, **{group: replace(current, **changes)})
+    return replace(params, ekf2=ekf2)
+
+
+def _wanted(params: Params, roles: Collection[str]) -> dict[str, dict[str, Any]]:
+    """Return the values these roles call for, by group of ekf2."""
+    has_fix = FIX in roles
+    wanted: dict[str, dict[str, Any]] = {
+        'timing': {'horizon_min_ms': params.session.horizon_ms},
+        'gnss': {'enabled': has_fix},
+    }
+    if PRESSURE not in roles:
+        wanted['height'] = {'reference': 'gnss' if has_fix else 'vision'}
+    if MAGNETIC_FIELD not in roles:
+        wanted['mag'] = {'type': 'none'}
+    if ODOMETRY in roles:
+        wanted['vision'] = {
+            'use_velocity': True,
+            'use_position': not has_fix,
+            'use_yaw': not has_fix,
+            'rotate': has_fix,
+            'delay_ms': params.session.odometry_delay_ms,
+        }
+    if IMU not in roles:
+        # The odometry's velocity increments carry no accelerometer bias.
+        wanted['imu'] = {'inhibit_accel_bias': True}
+    return wanted

@@ -1,0 +1,395 @@
+"""FusionSession: messages in, fused states out; the one path of node, replay and library."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Collection
+from collections.abc import Mapping
+from collections.abc import Sequence
+from dataclasses import dataclass
+from dataclasses import replace
+import math
+from typing import TYPE_CHECKING
+from typing import Any
+
+from ekf_fusion_ros.estimator import Estimator
+from ekf_fusion_ros.estimator import Event
+from ekf_fusion_ros.estimator import GeoPoint
+from ekf_fusion_ros.estimator import Health
+from ekf_fusion_ros.estimator import HealthLevel
+from ekf_fusion_ros.estimator import NavState
+from ekf_fusion_ros.inputs import InertialInput
+from ekf_fusion_ros.inputs import decoder_of
+from ekf_fusion_ros.messages.refusal import Refused
+from ekf_fusion_ros.odometry_heading import OdometryHeading
+from ekf_fusion_ros.pairing import FixPairing
+from ekf_fusion_ros.roles import FIX
+from ekf_fusion_ros.roles import FIX_VELOCITY
+from ekf_fusion_ros.roles import IMU
+from ekf_fusion_ros.roles import MAGNETIC_FIELD
+from ekf_fusion_ros.roles import ODOMETRY
+from ekf_fusion_ros.roles import PRESSURE
+from ekf_fusion_ros.roles import configure
+from ekf_fusion_ros.samples import AirspeedSample
+from ekf_fusion_ros.samples import AuxVelocitySample
+from ekf_fusion_ros.samples import BaroSample
+from ekf_fusion_ros.samples import FlowSample
+from ekf_fusion_ros.samples import GnssSample
+from ekf_fusion_ros.samples import HeadingSample
+from ekf_fusion_ros.samples import ImuSample
+from ekf_fusion_ros.samples import LandedSample
+from ekf_fusion_ros.samples import MagSample
+from ekf_fusion_ros.samples import RangeSample
+from ekf_fusion_ros.samples import Sample
+from ekf_fusion_ros.samples import VisionSample
+from ekf_fusion_ros.stamp_order import AidingOrder
+from ekf_fusion_ros.stamp_order import InertialOrder
+from ekf_fusion_ros.stamp_order import Step
+from ekf_fusion_ros.statistics import RoleStatistics
+
+if TYPE_CHECKING:
+    from ekf_fusion_ros.params.tree import Params
+
+SECOND_US = 1_000_000
+NO_HEIGHT_EPV = 1e3
+ROLE_OF_SAMPLE: dict[type, str] = {
+    ImuSample: IMU,
+    GnssSample: FIX,
+    VisionSample: ODOMETRY,
+    MagSample: MAGNETIC_FIELD,
+    BaroSample: PRESSURE,
+    RangeSample: 'range',
+    FlowSample: 'flow',
+    AirspeedSample: 'airspeed',
+    AuxVelocitySample: 'aux_velocity',
+    LandedSample: 'landed',
+    HeadingSample: 'heading',
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FusedOutput:
+    """One due output: the state at `nav.time_us` and the fixes taken in since the last one.
+
+    `local` is True where the frame is the odometry's own because no fix takes part.
+    """
+
+    nav: NavState
+    local: bool
+    fixes: tuple[GnssSample, ...] = ()
+
+    @property
+    def time_us(self) -> int:
+        """Stamp of the state in integer microseconds."""
+        return self.nav.time_us
+
+
+class FusionSession:
+    """Drives one estimator from messages (`handle`) or samples (`push`).
+
+    `roles` names the inputs in use; aiding is configured from them (roles.configure). With
+    `roles=None` samples go straight into the estimator with the parameters as they are.
+    `on_update` is called with the estimator after every filter update. Raises ValueError for
+    roles that cannot be fused.
+    """
+
+    def __init__(
+        self,
+        params: Params,
+        roles: Collection[str] | None = None,
+        *,
+        estimator: Estimator | None = None,
+        on_update: Callable[[Estimator], None] | None = None,
+    ) -> None:
+        self.params = params if roles is None else configure(params, roles)
+        self.roles = None if roles is None else frozenset(roles)
+        self._estimator = make_estimator(self.params) if estimator is None else estimator
+        self._on_update = on_update
+        self._statistics = {role: RoleStatistics() for role in sorted(roles or ())}
+        self._events: list[Event] = []
+        self._decoders = {role: decoder_of(role, self.params) for role in self._statistics}
+        self._inertial_role = IMU if roles is None or IMU in roles else ODOMETRY
+        self._local = self._is_local()
+        self._rate_mhz = round(1000 * self.params.session.output_rate)
+        self._last_altitude = 0.0
+        self._forget()
+
+    def _is_local(self) -> bool:
+        if self.roles is None:
+            return not self.params.ekf2.gnss.enabled
+        return FIX not in self.roles
+
+    def _forget(self) -> None:
+        """Begin a track: at the start, after a reset, after a jump of the stamps."""
+        session = self.params.session
+        roles = self.roles or frozenset()
+        self._now_us: int | None = None
+        self._tick: int | None = None
+        self._fixes: list[GnssSample] = []
+        self._inertial_order = InertialOrder(round(SECOND_US * session.stamp_gap_max))
+        self._aiding_order = {role: self._new_order() for role in roles}
+        self._heading = OdometryHeading()
+        self._pairing = self._new_pairing() if FIX_VELOCITY in roles else None
+        self._inertial = InertialInput(self.params, self._inertial_role) if roles else None
+        self._motion = make_motion_heading(self.params, roles)
+
+    def _new_order(self) -> AidingOrder:
+        session = self.params.session
+        return AidingOrder(round(SECOND_US * session.stamp_lead_max),
+                           round(SECOND_US * session.stamp_age_max))
+
+    def _new_pairing(self) -> FixPairing:
+        session = self.params.session
+        return FixPairing(self._statistics[FIX_VELOCITY],
+                          round(SECOND_US * session.pairing_tolerance),
+                          round(SECOND_US * session.pairing_wait))
+
+    # -- input -------------------------------------------------------------------------------
+
+    def handle(self, role: str, message: Any) -> list[FusedOutput]:
+        """Take one ROS message (of rosbags or rclpy) and return the outputs that are due.
+
+        Never raises for a bad message: it is counted by reason. Raises KeyError for a role that
+        the session was not made for.
+        """
+        statistics = self._statistics[role]
+        statistics.received += 1
+        try:
+            sample = self._decoders[role](message)
+            self._judge_order(role, sample.time_us)
+        except Refused as refusal:
+            self._count_refusal(role, refusal.reason, refusal.detail)
+            return []
+        return self._accept(role, sample)
+
+    def push(self, sample: Sample) -> list[FusedOutput]:
+        """Take one sample and return the outputs that are due.
+
+        With roles the sample passes the order checks of its role; without roles it goes straight
+        into the estimator.
+        """
+        role = ROLE_OF_SAMPLE[type(sample)]
+        statistics = self._statistics.setdefault(role, RoleStatistics())
+        statistics.received += 1
+        if self.roles is None:
+            statistics.accepted += 1
+            return self._push_directly(sample)
+        if role not in self.roles:
+            self._count_refusal(role, 'role_not_in_use', 'the session was made without it')
+            return []
+        try:
+            self._judge_order(role, sample.time_us)
+        except Refused as refusal:
+            self._count_refusal(role, refusal.reason, refusal.detail)
+            return []
+        return self._accept(role, sample)
+
+    def refuse(self, role: str, reason: str, detail: str = '') -> None:
+        """Count a message that the caller keeps from the session, by reason."""
+        self._statistics[role].received += 1
+        self._count_refusal(role, reason, detail)
+
+    def finish(self) -> list[FusedOutput]:
+        """Take in what still waits for a partner; after this the counts are complete."""
+        for fix in self._pairing.flush() if self._pairing else ():
+            self._push_fix(fix)
+        return []
+
+    def _push_directly(self, sample: Sample) -> list[FusedOutput]:
+        if isinstance(sample, ImuSample):
+            return self._advance(sample)
+        if isinstance(sample, VisionSample):
+            self._heading.push(sample)
+        if isinstance(sample, GnssSample):
+            self._fixes.append(sample)
+        self._estimator.push(sample)
+        return []
+
+    def _judge_order(self, role: str, time_us: int) -> None:
+        if role != self._inertial_role:
+            self._aiding_order[role].judge(time_us, self._inertial_order.last)
+            return
+        before = self._inertial_order.last
+        step = self._inertial_order.judge(time_us)
+        if step is Step.RESTART:
+            assert before is not None
+            self._tell(time_us, f'the stamps of {role} jumped by {(time_us - before) / 1e6:+.3f} '
+                       's: the estimator starts again')
+            self._restart()
+            self._inertial_order.judge(time_us)
+
+    def _accept(self, role: str, sample: Any) -> list[FusedOutput]:
+        if role == FIX_VELOCITY:
+            self._push_fixes(self._paired().push_velocity(sample))
+            return []
+        self._statistics[role].accepted += 1
+        if role == FIX:
+            self._accept_fix(sample)
+        elif role == ODOMETRY:
+            self._accept_odometry(sample)
+        elif role != IMU:
+            self._estimator.push(sample)
+        return self._run(sample) if role == self._inertial_role else []
+
+    def _accept_fix(self, fix: GnssSample) -> None:
+        if math.isfinite(fix.alt):
+            self._last_altitude = fix.alt
+        else:
+            # A fix without height still places the vehicle; its height must carry no weight.
+            fix = replace(fix, alt=self._last_altitude, epv=NO_HEIGHT_EPV)
+        self._push_fixes(self._pairing.push_fix(fix) if self._pairing else [fix])
+
+    def _accept_odometry(self, sample: VisionSample) -> None:
+        self._heading.push(sample)
+        if self._motion is not None:
+            self._motion.push_odometry(sample)
+        self._estimator.push(sample)
+
+    def _push_fixes(self, fixes: Sequence[GnssSample]) -> None:
+        for fix in fixes:
+            self._push_fix(fix)
+
+    def _push_fix(self, fix: GnssSample) -> None:
+        self._fixes.append(fix)
+        self._estimator.push(fix)
+        heading = None if self._motion is None else self._motion.push_fix(fix)
+        if heading is not None:
+            self._estimator.push(heading)
+
+    def _paired(self) -> FixPairing:
+        assert self._pairing is not None
+        return self._pairing
+
+    # -- time --------------------------------------------------------------------------------
+
+    def _run(self, reading: Any) -> list[FusedOutput]:
+        assert self._inertial is not None
+        outputs: list[FusedOutput] = []
+        for imu in self._inertial.push(reading):
+            if self._now_us is None and self.params.session.assume_in_air:
+                self._estimator.push(LandedSample(imu.time_us, landed=False))
+            if self._pairing is not None:
+                self._push_fixes(self._pairing.advance(imu.time_us))
+            outputs += self._advance(imu)
+        return outputs
+
+    def _advance(self, imu: ImuSample) -> list[FusedOutput]:
+        """Step the estimator by one increment and return the output that is due, if any."""
+        self._now_us = imu.time_us
+        self._estimator.push(imu)
+        if not self._estimator.update():
+            return []
+        if self._on_update is not None:
+            self._on_update(self._estimator)
+        # Rows stand at filter updates, so those of any rate are a subset of all updates.
+        tick = imu.time_us * self._rate_mhz // 1_000_000_000
+        if self._rate_mhz and tick == self._tick:
+            return []
+        self._tick = tick
+        nav = self._estimator.nav_state()
+        if nav is None or not (self._local or (nav.yaw_aligned and nav.origin is not None)):
+            return []
+        fixes, self._fixes = tuple(self._fixes), []
+        return [FusedOutput(nav, self._local, fixes)]
+
+    def _restart(self) -> None:
+        for fix in self._pairing.flush() if self._pairing else ():
+            self._push_fix(fix)
+        self._collect()
+        self._estimator.reset()
+        self._forget()
+
+    # -- what it knows -----------------------------------------------------------------------
+
+    @property
+    def estimator(self) -> Estimator:
+        """The estimator that is driven."""
+        return self._estimator
+
+    @property
+    def local(self) -> bool:
+        """True where outputs are in the odometry's own frame because no fix takes part."""
+        return self._local
+
+    @property
+    def origin(self) -> GeoPoint | None:
+        """Origin of the map frame, None before it is set."""
+        nav = self._estimator.nav_state()
+        return None if nav is None else nav.origin
+
+    def set_origin(self, origin: GeoPoint) -> bool:
+        """Move the origin of the map frame; False where the point is unusable."""
+        return self._estimator.set_origin(origin)
+
+    def reset(self) -> None:
+        """Start again with the same parameters; counts and events go on."""
+        self._restart()
+
+    def alignment(self) -> tuple[float, float] | None:
+        """Return heading of the odometry frame against ENU and its sigma in rad.
+
+        None without odometry or fix, and before the yaw is aligned.
+        """
+        nav = None if self._local else self._estimator.nav_state()
+        if nav is None or not nav.yaw_aligned:
+            return None
+        return self._heading.estimate(nav)
+
+    def statistics(self) -> Mapping[str, RoleStatistics]:
+        """Return the counts by role; exact at any time but for `pending` ones."""
+        return self._statistics
+
+    def drain_events(self) -> list[Event]:
+        """Return and forget the events since the last call, in order of time."""
+        self._collect()
+        events, self._events = self._events, []
+        return events
+
+    def health(self) -> Health:
+        """Say in one sentence what the session is doing or waiting for."""
+        health = self._estimator.health()
+        waiting = self._waiting_for()
+        if not waiting:
+            return health
+        level = max(health.level, HealthLevel.WARN)
+        return Health(level, waiting, health.values)
+
+    def _waiting_for(self) -> str:
+        if self.roles is None:
+            return ''
+        needed = [self._inertial_role] + ([] if self._local else [FIX])
+        for role in needed:
+            statistics = self._statistics[role]
+            if statistics.accepted == 0:
+                reasons = ', '.join(f'{n} {reason}' for reason, n in statistics.refused.items())
+                return (f'waiting for {role}: {statistics.received} received, none accepted'
+                        + (f' ({reasons})' if reasons else ''))
+        nav = self._estimator.nav_state()
+        aligned = nav is not None and nav.yaw_aligned
+        return '' if aligned or self._motion is None else self._motion.status()
+
+    def _collect(self) -> None:
+        self._events += self._estimator.drain_events()
+
+    def _tell(self, time_us: int, text: str) -> None:
+        self._collect()
+        self._events.append(Event(time_us, text))
+
+    def _count_refusal(self, role: str, reason: str, detail: str) -> None:
+        first = self._statistics[role].refuse(reason, detail)
+        if first and detail:
+            self._tell(self._now_us or 0, f'{role}: refused, {reason}: {detail}')
+
+
+def make_estimator(params: Params) -> Estimator:
+    """Return the estimator that the parameters name."""
+    from ekf_fusion_ros.ekf2.ekf2 import Ekf2
+    return Ekf2(params.ekf2)
+
+
+def make_motion_heading(params: Params, roles: Collection[str]) -> Any:
+    """Return what finds the heading of the odometry frame from motion, None where not needed."""
+    if not (FIX in roles and ODOMETRY in roles):
+        return None
+    from ekf_fusion_ros.motion_heading import MotionHeading
+    return MotionHeading(params.two_topic)

@@ -1,0 +1,76 @@
+"""Order of stamps: what is repeated, backward, ahead, too old or a restart."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from ekf_fusion_ros.messages.refusal import Refused
+
+
+class Step(Enum):
+    """How an inertial stamp follows the one before."""
+
+    FIRST = 0
+    FORWARD = 1
+    RESTART = 2
+
+
+class InertialOrder:
+    """Judges the stamps that drive time.
+
+    A single wild stamp must not restart the filter, so a jump is believed when the next message
+    continues from it.
+    """
+
+    def __init__(self, jump_us: int) -> None:
+        self._jump_us = jump_us
+        self._suspect: int | None = None
+        self.last: int | None = None
+
+    def judge(self, time_us: int) -> Step:
+        """Return the kind of step; raise Refused for a stamp that is not usable."""
+        if self.last is None:
+            self.last = time_us
+            return Step.FIRST
+        step = time_us - self.last
+        if step == 0:
+            raise Refused('repeated_stamp', f'stamp {time_us / 1e6:.6f} s came twice')
+        if 0 < step <= self._jump_us:
+            self.last, self._suspect = time_us, None
+            return Step.FORWARD
+        if -self._jump_us <= step < 0:
+            raise Refused('backward_stamp', f'stamp {-step / 1e6:.6f} s before the one before')
+        if self._suspect is not None and 0 < time_us - self._suspect <= self._jump_us:
+            self.last, self._suspect = time_us, None
+            return Step.RESTART
+        self._suspect = time_us
+        raise Refused('stamp_jump', f'stamp {step / 1e6:+.3f} s from the one before')
+
+
+class AidingOrder:
+    """Judges the stamps of an aiding role against their own order and inertial time."""
+
+    def __init__(self, lead_us: int, age_us: int) -> None:
+        self._lead_us = lead_us
+        self._age_us = age_us
+        self.last: int | None = None
+
+    def judge(self, time_us: int, now_us: int | None) -> None:
+        """Raise Refused for a stamp that is not usable; now_us: newest inertial stamp."""
+        if now_us is not None:
+            self._against_inertial(time_us, now_us)
+        step = 1 if self.last is None else time_us - self.last
+        # Far behind its predecessor yet close to inertial time: the predecessor was wrong.
+        wild_before = now_us is not None and step < -(self._lead_us + self._age_us)
+        if step == 0:
+            raise Refused('repeated_stamp', f'stamp {time_us / 1e6:.6f} s came twice')
+        if step < 0 and not wild_before:
+            raise Refused('backward_stamp', f'stamp {-step / 1e6:.6f} s before the one before')
+        self.last = time_us
+
+    def _against_inertial(self, time_us: int, now_us: int) -> None:
+        lead = time_us - now_us
+        if lead > self._lead_us:
+            raise Refused('stamp_ahead', f'stamp {lead / 1e6:.3f} s ahead of the inertial input')
+        if lead < -self._age_us:
+            raise Refused('too_old', f'stamp {-lead / 1e6:.3f} s behind the inertial input')

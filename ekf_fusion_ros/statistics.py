@@ -1,0 +1,46 @@
+"""Exact counts of what came in: every message is accepted or refused, once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from dataclasses import field
+
+
+@dataclass(slots=True)
+class RoleStatistics:
+    """Counts of one role.
+
+    `pending` messages wait for a partner and will be one or the other. `details` holds the
+    first sentence said for each reason.
+    """
+
+    received: int = 0
+    accepted: int = 0
+    refused: dict[str, int] = field(default_factory=dict)
+    details: dict[str, str] = field(default_factory=dict)
+
+    def refuse(self, reason: str, detail: str = '') -> bool:
+        """Count a refusal; True when this reason is new."""
+        first = reason not in self.refused
+        self.refused[reason] = self.refused.get(reason, 0) + 1
+        if first:
+            self.details[reason] = detail
+        return first
+
+    @property
+    def refused_total(self) -> int:
+        """Number of refused messages over all reasons."""
+        return sum(self.refused.values())
+
+    @property
+    def pending(self) -> int:
+        """Messages received and not yet judged."""
+        return self.received - self.accepted - self.refused_total
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the counts as plain types, for summary.json and diagnostics."""
+        return {
+            'received': self.received,
+            'accepted': self.accepted,
+            'refused': dict(sorted(self.refused.items())),
+        }
