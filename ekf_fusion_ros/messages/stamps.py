@@ -1,0 +1,34 @@
+"""Header stamps and integer microseconds; nothing else converts between them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ekf_fusion_ros.messages.refusal import Refused
+
+SECOND_US = 1_000_000
+
+
+def microseconds(sec: int, nanosec: int) -> int:
+    """Return a stamp as integer microseconds, nanoseconds rounded to nearest, halves up."""
+    return int(sec) * SECOND_US + (int(nanosec) + 500) // 1000
+
+
+def seconds_nanoseconds(time_us: int) -> tuple[int, int]:
+    """Return integer microseconds as (sec, nanosec) with 0 <= nanosec < 1e9."""
+    sec, rest = divmod(time_us, SECOND_US)
+    return sec, rest * 1000
+
+
+def stamp_of(message: Any) -> int:
+    """Return the header stamp of a message in integer microseconds.
+
+    Raises Refused 'zero_stamp' for a stamp that is zero or negative.
+    """
+    stamp = message.header.stamp
+    time_us = microseconds(stamp.sec, stamp.nanosec)
+    if time_us <= 0:
+        raise Refused(
+            'zero_stamp',
+            f'header.stamp is {stamp.sec}.{stamp.nanosec:09d}: the driver must stamp its messages')
+    return time_us
