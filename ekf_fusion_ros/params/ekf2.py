@@ -196,6 +196,16 @@ class HeightParams:
     """Which sensor is the height reference."""
 
     reference: str = param('baro', 'Primary height source.', choices=HEIGHT_REFERENCES)
+    wait_for_baro: bool = param(
+        False, 'Do not start without barometric height, whatever the reference is.')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EarthParams:
+    """Shape of the earth."""
+
+    projection: str = param('wgs84', 'Ellipsoid, or the sphere of 6371 km that PX4 uses.',
+                            choices=('wgs84', 'sphere'))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -263,6 +273,7 @@ class Ekf2Params:
     mag: MagParams = field(default_factory=MagParams)
     baro: BaroParams = field(default_factory=BaroParams)
     height: HeightParams = field(default_factory=HeightParams)
+    earth: EarthParams = field(default_factory=EarthParams)
     terrain: TerrainParams = field(default_factory=TerrainParams)
     aiding: AidingParams = field(default_factory=AidingParams)
     output: OutputParams = field(default_factory=OutputParams)

@@ -1,0 +1,206 @@
+"""The owner of P: prediction, limits, and what resets do to it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ekf_fusion_ros.ekf2.state import FILTER_PERIOD
+from ekf_fusion_ros.ekf2.state import SIZE
+from ekf_fusion_ros.kernels.prediction import GRAVITY
+from ekf_fusion_ros.kernels.prediction import fill_transition
+from ekf_fusion_ros.kernels.prediction import predict_covariance
+from ekf_fusion_ros.kernels.update import apply_direct
+from ekf_fusion_ros.kernels.update import apply_update
+from ekf_fusion_ros.kernels.update import limit_covariance
+from ekf_fusion_ros.params.ekf2 import Ekf2Params
+
+Array = NDArray[np.float64]
+
+BAD_ACCEL_NOISE = 4.9
+"""Accelerometer noise in m/s^2 while it clips or contradicts the height aiding."""
+
+FIELD_LEARNED_VARIANCE = 0.1
+WIND_LEARNED_VARIANCE = 1.0
+
+
+class Covariance:
+    """Covariance of the 24 states; nothing outside this class and its kernels writes `p`."""
+
+    def __init__(self, params: Ekf2Params) -> None:
+        """Start at zero; `initialise` gives the first values."""
+        self.p: Array = np.zeros((SIZE, SIZE))
+        self.inhibited = np.zeros(3)
+        self._saved = np.zeros(3)
+        self._transition = np.zeros((10, SIZE))
+        self._saved_ne = np.zeros((2, 2))
+        self._saved_d_body = np.zeros(4)
+        self.mag_active = False
+        self.wind_active = False
+        self._accel_bias_var_max = (0.1 * GRAVITY * FILTER_PERIOD) ** 2
+        imu, mag = params.imu, params.mag
+        dt = FILTER_PERIOD
+        self._angle_var = (dt * min(imu.gyro_noise, 1.0)) ** 2
+        self._accel_var = (dt * min(imu.accel_noise, 1.0)) ** 2
+        self._bad_accel_var = (dt * BAD_ACCEL_NOISE) ** 2
+        self._noise = np.zeros(SIZE)
+        self._noise[10:13] = (dt * dt * imu.gyro_bias_process_noise) ** 2
+        self._noise[13:16] = (dt * dt * imu.accel_bias_process_noise) ** 2
+        self._field_noise = ((dt * mag.earth_process_noise) ** 2,
+                             (dt * mag.body_process_noise) ** 2)
+        self._wind_noise = dt * params.aiding.wind_process_noise
+
+    def predict(
+        self, x: Array, imu: Array, dt_avg: float, bad_accel: bool,
+        clipping: tuple[bool, bool, bool], climb_rate: float,
+    ) -> None:
+        """Propagate P over one filter period of nominal length.
+
+        imu (8,) raw increments; dt_avg mean filter period in s; climb_rate m/s scales the wind noise.
+        """
+        self._accel_bias_var_max = (0.1 * GRAVITY * dt_avg) ** 2
+        fill_transition(x[0:4], imu[0:3] - x[10:13], imu[3:6] - x[13:16], FILTER_PERIOD,
+                        self._transition)
+        velocity_var = np.full(3, self._bad_accel_var if bad_accel else self._accel_var)
+        if any(clipping):
+            velocity_var[list(clipping)] = self._bad_accel_var
+        p = self.p
+        noise = self._noise.copy()
+        if self.mag_active:
+            earth, body = self._field_noise
+            if p[16, 16] + p[17, 17] + p[18, 18] < FIELD_LEARNED_VARIANCE:
+                noise[16:19] = earth
+            if p[19, 19] + p[20, 20] + p[21, 21] < FIELD_LEARNED_VARIANCE:
+                noise[19:22] = body
+        if self.wind_active and p[22, 22] + p[23, 23] < WIND_LEARNED_VARIANCE:
+            noise[22:24] = (self._wind_noise * (1.0 + 0.5 * abs(climb_rate))) ** 2
+        predict_covariance(p, self._transition, self._angle_var, velocity_var, noise,
+                           self.inhibited, self._saved, self.mag_active, self.wind_active)
+        self._limit()
+
+    def inhibit_accel_bias(self, axis: int, inhibit: bool) -> None:
+        """Freeze or release the estimation of one accelerometer bias, keeping its variance."""
+        state = 13 + axis
+        if inhibit and self.inhibited[axis] == 0.0:
+            self._saved[axis] = self.p[state, state]
+            self.inhibited[axis] = 1.0
+        elif not inhibit and self.inhibited[axis] != 0.0:
+            self.p[state, state] = self._saved[axis]
+            self.inhibited[axis] = 0.0
+
+    def fuse_direct(self, x: Array, state: int, variance: float, innovation: float) -> bool:
+        """Correct with an observation of one state; False on a numerical fault."""
+        return bool(apply_direct(
+            self.p, x, state, variance, innovation, self.inhibited, self._accel_bias_var_max,
+            self.mag_active, self.wind_active))
+
+    def fuse(self, x: Array, gain: Array, hp: Array, innovation: float) -> bool:
+        """Correct with a gain (24,) and H P (24,); False on a numerical fault."""
+        return bool(apply_update(
+            self.p, x, gain, hp, innovation, self.inhibited, self._accel_bias_var_max,
+            self.mag_active, self.wind_active))
+
+    def decorrelate(self, first: int, size: int) -> None:
+        """Remove all correlations of states first .. first + size - 1, keeping variances."""
+        variances = np.diag(self.p)[first:first + size].copy()
+        self.set_variances(first, variances)
+
+    def set_variances(self, first: int, variances: Array) -> None:
+        """Decorrelate states from `first` on and give them variances."""
+        last = first + len(variances)
+        self.p[first:last, :] = 0.0
+        self.p[:, first:last] = 0.0
+        for i, variance in enumerate(variances):
+            self.p[first + i, first + i] = variance
+
+    def decorrelate_attitude(self) -> None:
+        """Remove the correlations of the quaternion with all other states."""
+        self.p[0:4, 4:] = 0.0
+        self.p[4:, 0:4] = 0.0
+
+    def set_attitude(self, q: Array, variances: Array) -> None:
+        """Give the quaternion the covariance of a rotation vector with variances (3,) rad^2."""
+        jacobian = quat_by_rotation_vector(q)
+        self.p[0:4, :] = 0.0
+        self.p[:, 0:4] = 0.0
+        self.p[0:4, 0:4] = jacobian @ np.diag(variances) @ jacobian.T
+
+    def add_yaw_variance(self, q: Array, variance: float) -> None:
+        """Add variance (rad^2, at most 0.01) about the earth's vertical."""
+        direction = 0.5 * np.array((-q[3], -q[2], q[1], q[0]))
+        self.p[0:4, 0:4] += min(variance, 0.01) * np.outer(direction, direction)
+
+    def activate_mag(self, active: bool) -> None:
+        """Switch the field states on or off; their variances survive the pause."""
+        p = self.p
+        if active and not self.mag_active:
+            p[16:22, :] = 0.0
+            p[:, 16:22] = 0.0
+            p[16:18, 16:18] = self._saved_ne
+            for i in range(4):
+                p[18 + i, 18 + i] = self._saved_d_body[i]
+        elif not active and self.mag_active:
+            self._save_field()
+        self.mag_active = active
+
+    def reset_field(self, variance: float) -> None:
+        """Forget what is known of the field states."""
+        self.set_variances(16, np.full(6, variance))
+        if not self.mag_active:
+            self._save_field()
+
+    def clear_field(self) -> None:
+        """Zero the field block of P."""
+        self.p[16:22, :] = 0.0
+        self.p[:, 16:22] = 0.0
+
+    def set_wind(self, block: Array) -> None:
+        """Give the wind states a covariance (2, 2) and no correlation."""
+        self.p[22:24, :] = 0.0
+        self.p[:, 22:24] = 0.0
+        self.p[22:24, 22:24] = block
+
+    def _save_field(self) -> None:
+        self._saved_ne = self.p[16:18, 16:18].copy()
+        self._saved_d_body = np.diag(self.p)[18:22].copy()
+
+    def _limit(self) -> None:
+        limit_covariance(self.p, self.inhibited, self._accel_bias_var_max, self.mag_active,
+                         self.wind_active)
+
+
+def quat_by_rotation_vector(q: Array) -> Array:
+    """Return d(quaternion)/d(rotation vector), (4, 3), at the rotation vector of q.
+
+    From q = [cos(|r|/2), r sin(|r|/2) / |r|].
+    """
+    q = -q if q[0] < 0.0 else q
+    vector_norm = float(np.linalg.norm(q[1:4]))
+    half = math.atan2(vector_norm, q[0])
+    angle = 2.0 * half
+    if angle * angle <= 1e-9:
+        return 0.5 * np.vstack((np.zeros(3), np.eye(3)))
+    axis = q[1:4] / vector_norm
+    s, c = math.sin(half), math.cos(half)
+    jacobian = np.empty((4, 3))
+    jacobian[0] = -0.5 * s * axis
+    jacobian[1:4] = (s / angle) * np.eye(3) + np.outer(axis, axis) * (0.5 * c - s / angle)
+    return jacobian
+
+
+def rotation_vector_variances(q: Array, p: Array) -> Array:
+    """Return the variances (3,) rad^2 of the rotation vector of q, from the quaternion block."""
+    sign = -1.0 if q[0] < 0.0 else 1.0
+    q0 = sign * q[0]
+    s = 1.0 - q0 * q0
+    if s <= 1e-9:
+        return np.array((4.0 * p[1, 1], 4.0 * p[2, 2], 4.0 * p[3, 3]))
+    b = 2.0 * math.acos(q0) / math.sqrt(s)
+    along = -2.0 / s + 2.0 * q0 * math.acos(q0) / s ** 1.5
+    variances = np.empty(3)
+    for i in range(3):
+        a = along * sign * q[1 + i]
+        variances[i] = a * a * p[0, 0] + 2.0 * a * b * p[0, 1 + i] + b * b * p[1 + i, 1 + i]
+    return variances

@@ -1,0 +1,143 @@
+"""What all parts of the filter share: states, flags, clocks and records."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ekf_fusion_ros.ekf2.covariance import Covariance
+from ekf_fusion_ros.ekf2.earth import EarthReference
+from ekf_fusion_ros.ekf2.events import EventLog
+from ekf_fusion_ros.ekf2.flags import ControlFlags
+from ekf_fusion_ros.ekf2.flags import FaultFlags
+from ekf_fusion_ros.ekf2.flags import FusionTimes
+from ekf_fusion_ros.ekf2.flags import Rejections
+from ekf_fusion_ros.ekf2.observation import Observation
+from ekf_fusion_ros.ekf2.output_predictor import OutputPredictor
+from ekf_fusion_ros.ekf2.state import FILTER_PERIOD
+from ekf_fusion_ros.ekf2.state import SIZE
+from ekf_fusion_ros.params.ekf2 import Ekf2Params
+from ekf_fusion_ros.samples import VisionSample
+
+Array = NDArray[np.float64]
+
+
+class DelayedImu(NamedTuple):
+    """One filter period of inertial data: delta angle (3), delta velocity (3), both intervals."""
+
+    time_us: int
+    increments: Array
+    clipping: tuple[bool, bool, bool]
+
+
+class GnssFix(NamedTuple):
+    """A fix in the local frame: NE position (2,) m, altitude m, NED velocity (3,) m/s."""
+
+    time_us: int
+    position: Array
+    altitude: float
+    velocity: Array
+    hacc: float
+    vacc: float
+    sacc: float
+    has_velocity: bool
+
+
+class VerticalCheck(NamedTuple):
+    """Normalised innovation of the latest vertical velocity or position, and its time."""
+
+    ratio: float = 0.0
+    time_us: int = 0
+
+
+class Observations:
+    """One record per kind of observation."""
+
+    def __init__(self) -> None:
+        """Start with nothing tried."""
+        self.gps_hor_vel = Observation('gnss_velocity', 2)
+        self.gps_ver_vel = Observation('gnss_vertical_velocity')
+        self.gps_hor_pos = Observation('gnss_position', 2)
+        self.gps_height = Observation('gnss_height')
+        self.ev_hor_vel = Observation('vision_velocity', 2)
+        self.ev_ver_vel = Observation('vision_vertical_velocity')
+        self.ev_hor_pos = Observation('vision_position', 2)
+        self.ev_height = Observation('vision_height')
+        self.baro_height = Observation('baro_height')
+        self.yaw = Observation('yaw')
+        self.mag = Observation('magnetic_field', 3)
+        self.declination = Observation('declination')
+        self.fake_pos = Observation('fake_position', 2)
+        self.fake_height = Observation('fake_height')
+
+    def all(self) -> list[Observation]:
+        """Return every record."""
+        return list(vars(self).values())
+
+
+class Filter:
+    """The state of the estimator, shared by prediction, aid sources and resets.
+
+    `x` holds the 24 states in the order of state.py, `cov` owns their covariance. `rot` is the body
+    to earth matrix cached at the prediction; measurement updates do not refresh it, so that all
+    lever arms of one step use the same attitude.
+    """
+
+    def __init__(self, params: Ekf2Params, history: int) -> None:
+        """Start level at rest; history is the number of filter periods back to the horizon."""
+        self.params = params
+        self.x: Array = np.zeros(SIZE)
+        self.x[0] = 1.0
+        self.cov = Covariance(params)
+        self.rot: Array = np.eye(3)
+        self.imu = DelayedImu(0, np.zeros(8), (False, False, False))
+        self.rate = np.zeros(3)
+        self.t_now = 0
+        self.t_horizon = 0
+        self.dt_imu_avg = 0.0
+        self.dt_avg = FILTER_PERIOD
+        self.accel_lpf = np.zeros(2)
+        self.flags = ControlFlags()
+        self.previous_flags = ControlFlags()
+        self.faults = FaultFlags()
+        self.rejections = Rejections()
+        self.times = FusionTimes()
+        self.observations = Observations()
+        self.events = EventLog()
+        self.earth = EarthReference(params.earth.projection, params.mag.field_model)
+        self.output = OutputPredictor(params.output, history)
+        self.ver_vel_check = VerticalCheck()
+        self.ver_pos_check = VerticalCheck()
+        self.last_on_ground_us = 0
+        self.last_in_air_us = 0
+        self.last_known_position = np.zeros(2)
+        self.fix: GnssFix | None = None
+        self.vision: VisionSample | None = None
+        self.rot_ev: Array = np.eye(3)
+        self.last_velocity = np.zeros(2)
+        self.last_velocity_variance = np.zeros(2)
+        self.position_is_relative = False
+        self.holding_position = False
+        self.dead_reckoning = True
+        self.last_aiding_us = 0
+        self.yaw_reset_requested = False
+
+    def late(self, stamp_us: int, timeout_us: int) -> bool:
+        """True when more than a timeout has passed since a stamp."""
+        return stamp_us + timeout_us < self.t_now
+
+    def recent(self, stamp_us: int, timeout_us: int) -> bool:
+        """True when less than a timeout has passed since a stamp."""
+        return stamp_us + timeout_us > self.t_now
+
+    @property
+    def position(self) -> Array:
+        """Position (3,) NED in m."""
+        return self.x[7:10]
+
+    @property
+    def velocity(self) -> Array:
+        """Velocity (3,) NED in m/s."""
+        return self.x[4:7]

@@ -1,0 +1,81 @@
+"""Carries the delayed filter state forward to the newest IMU sample."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ekf_fusion_ros.kernels.output import attitude_error
+from ekf_fusion_ros.kernels.output import correct_output
+from ekf_fusion_ros.kernels.output import propagate_output
+from ekf_fusion_ros.mathlib.rotation import quat_multiply
+from ekf_fusion_ros.params.ekf2 import OutputParams
+from ekf_fusion_ros.samples import ImuSample
+
+Array = NDArray[np.float64]
+
+
+class OutputPredictor:
+    """Strapdown at full IMU rate that tracks the filter through its own delayed history.
+
+    The attitude error against the filter at the horizon is spread over the delay; velocity and
+    position errors move the whole history by a proportional-integral law.
+    """
+
+    def __init__(self, params: OutputParams, history: int) -> None:
+        """Keep as many periods of history as the fusion horizon is delayed."""
+        self._params = params
+        self.now = np.zeros(10)
+        self.now[0] = 1.0
+        self.rot = np.zeros((3, 3))
+        self.rate = np.zeros(3)
+        self.yaw = np.zeros(2)
+        self.velocity_offset = np.zeros(3)
+        self.tracking_error = np.zeros(3)
+        self._history = np.zeros((history, 10))
+        self._pushed = 0
+        self._correction = np.zeros(3)
+        self._integral = np.zeros(6)
+
+    def align(self, x: Array) -> None:
+        """Start from the filter state (24,)."""
+        self._history[:] = x[0:10]
+        self.now[:] = x[0:10]
+
+    def propagate(
+        self, imu: ImuSample, x: Array, dt_imu_avg: float, dt_avg: float, imu_position: Array,
+    ) -> None:
+        """Advance by one raw IMU sample."""
+        propagate_output(self.now, self.rot, imu.delta_angle, imu.delta_velocity,
+                         imu.delta_angle_dt, imu.delta_velocity_dt, x, dt_imu_avg / dt_avg,
+                         self._correction, self.yaw)
+        self.rate = imu.delta_angle / imu.delta_angle_dt
+        if imu_position.any():
+            self.velocity_offset = self.rot @ np.cross(self.rate, imu_position)
+
+    def correct(self, x: Array, delay: float, dt_imu_avg: float, dt_avg: float) -> None:
+        """Compare with the filter state (24,) that lies `delay` s in the past."""
+        size = len(self._history)
+        self._history[self._pushed % size] = self.now
+        self._pushed += 1
+        filled = self._pushed >= size
+        oldest = self._pushed % size if filled else 0
+        error = attitude_error(x[0:4], self._history[oldest, 0:4])
+        self._correction = error * (0.5 * dt_imu_avg / max(delay, dt_imu_avg))
+        vel_gain = dt_avg / min(max(self._params.vel_tau, dt_avg), 10.0)
+        pos_gain = dt_avg / min(max(self._params.pos_tau, dt_avg), 10.0)
+        correct_output(self.now, self._history, oldest, x, self._integral, vel_gain, pos_gain,
+                       self.tracking_error[1:3])
+        self.tracking_error[0] = np.linalg.norm(error)
+
+    def rotate(self, delta: Array) -> None:
+        """Turn the whole history by an earth-frame quaternion (4,), as a reset does."""
+        for row in self._history:
+            row[0:4] = quat_multiply(delta, row[0:4])
+        self.now[0:4] = quat_multiply(delta, self.now[0:4])
+
+    def shift(self, first: int, delta: Array) -> None:
+        """Add to the entries of velocity (first = 4..6) or position (7..9), as a reset does."""
+        last = first + len(delta)
+        self._history[:, first:last] += delta
+        self.now[first:last] += delta
