@@ -14,6 +14,9 @@ from typing import get_origin
 from typing import get_type_hints
 
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
+from ekf_fusion_ros.params.messages import MessageParams
+from ekf_fusion_ros.params.node import NodeParams
+from ekf_fusion_ros.params.session import SessionParams
 from ekf_fusion_ros.params.spec import leaves
 from ekf_fusion_ros.params.spec import param
 from ekf_fusion_ros.params.spec import validate
@@ -28,6 +31,9 @@ class Params:
 
     estimator: str = param('ekf2', 'Which estimator runs.', choices=('ekf2',))
     ekf2: Ekf2Params = field(default_factory=Ekf2Params)
+    messages: MessageParams = field(default_factory=MessageParams)
+    session: SessionParams = field(default_factory=SessionParams)
+    node: NodeParams = field(default_factory=NodeParams)
 
     def __post_init__(self) -> None:
         """Raise ValueError for the estimator that is named but not there yet."""

@@ -1,0 +1,47 @@
+"""What every test may count on: DDS kept on this machine, fresh kernels, the shared folder."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+import tempfile
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+
+
+def _kernel_cache() -> str:
+    """Return a cache folder for compiled kernels that belongs to these sources.
+
+    numba renews a cached function when its own file changes, not when one it calls does.
+    """
+    digest = hashlib.sha256()
+    for source in sorted((REPOSITORY / 'ekf_fusion_ros').rglob('*.py')):
+        text = source.read_bytes()
+        if b'@kernel' in text:
+            digest.update(text)
+    return str(Path(tempfile.gettempdir()) / f'ekf_fusion_ros_numba_{digest.hexdigest()[:16]}')
+
+
+# Before rclpy or numba is imported by any test.
+os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
+os.environ.setdefault('MPLBACKEND', 'Agg')
+os.environ.setdefault('NUMBA_CACHE_DIR', _kernel_cache())
+
+
+@pytest.fixture(scope='session')
+def repository() -> Path:
+    """Root of the repository."""
+    return REPOSITORY
+
+
+@pytest.fixture(scope='session')
+def shared() -> Path:
+    """Folder of recordings and references beside the repository; skips where it is absent."""
+    folder = REPOSITORY.parent / 'shared'
+    if not folder.is_dir():
+        pytest.skip('no folder "shared" with recordings beside the repository')
+    return folder

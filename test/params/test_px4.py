@@ -1,0 +1,122 @@
+"""PX4 and ECL parameters in ours; expectations from PX4's parameter reference."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from ekf_fusion_ros.params import Params
+from ekf_fusion_ros.params import load_file
+from ekf_fusion_ros.params.ekf2 import Ekf2Params
+from ekf_fusion_ros.params.px4 import translate
+from ekf_fusion_ros.params.spec import leaves
+
+QGC_FILE = """\
+# Onboard parameters for Vehicle 1
+#
+# Vehicle-Id Component-Id Name Value Type
+1\t1\tEKF2_AID_MASK\t321\t6
+1\t1\tEKF2_GPS_CHECK\t245\t6
+1\t1\tEKF2_GPS_DELAY\t120.000000000000000000\t9
+1\t1\tEKF2_GPS_P_NOISE\t0.300000011920928955\t9
+1\t1\tEKF2_HGT_MODE\t3\t6
+1\t1\tEKF2_IMU_POS_Y\t-0.25\t9
+1\t1\tEKF2_MAG_TYPE\t5\t6
+1\t1\tEKF2_MULTI_IMU\t3\t6
+1\t1\tEKF2_NOAID_TOUT\t3000000\t6
+1\t1\tEKF2_REQ_GPS_H\t4.5\t9
+1\t1\tMC_ROLL_P\t6.5\t9
+1\t1\tSYS_AUTOSTART\t4001\t6
+"""
+
+
+def test_px4_file(tmp_path: Path) -> None:
+    path = tmp_path / 'vehicle.params'
+    path.write_text(QGC_FILE, encoding='utf-8')
+    loaded = load_file(path)
+    ekf2 = loaded.params.ekf2
+
+    # 321 = 1 + 64 + 256: GPS, rotate external vision, vision velocity.
+    assert ekf2.gnss.enabled and ekf2.vision.rotate and ekf2.vision.use_velocity
+    assert not (ekf2.vision.use_position or ekf2.vision.use_yaw or ekf2.gnss.yaw)
+    # 245 = all but PDOP (2) and vertical accuracy (8), without vertical speed (256).
+    checks = ekf2.gnss.checks
+    assert checks.nsats and checks.hacc and checks.sacc
+    assert checks.hdrift and checks.vdrift and checks.hspeed
+    assert not (checks.pdop or checks.vacc or checks.vspeed)
+    assert ekf2.gnss.delay_ms == 120.0
+    assert ekf2.gnss.pos_noise == pytest.approx(0.3, abs=1e-7)
+    assert ekf2.height.reference == 'vision'
+    assert ekf2.imu.position == (0.0, -0.25, 0.0)
+    assert ekf2.mag.type == 'none'
+    assert ekf2.aiding.valid_timeout == pytest.approx(3.0)
+    assert checks.health_time == 4.5
+    assert loaded.unused == ['EKF2_MULTI_IMU', '2 parameters of other PX4 modules']
+
+
+def test_ecl_file(tmp_path: Path) -> None:
+    path = tmp_path / 'params.txt'
+    path.write_text(
+        'fusion_mode=331\nvehicle.fixed_wing=1\nvehicle.flow_limits=6;0;50\noutput.every=5\n'
+        'imu_pos_body=0.06;-0.04;0.03\nmag_fusion_type=4\nvalid_timeout_max=4000000\n'
+        'bcoef_x=25\nmag_declination_source=1\ncheck_mag_strength=1\n', encoding='utf-8')
+    loaded = load_file(path)
+    ekf2 = loaded.params.ekf2
+
+    # 331 = 1 + 2 + 8 + 64 + 256: GPS, flow, vision position, rotate, vision velocity.
+    assert ekf2.gnss.enabled and ekf2.vision.use_position and ekf2.vision.rotate
+    assert ekf2.vision.use_velocity and not ekf2.vision.use_yaw
+    assert ekf2.imu.position == (0.06, -0.04, 0.03)
+    assert ekf2.mag.type == 'indoor' and ekf2.mag.check_strength
+    assert ekf2.mag.declination_from_table and not ekf2.mag.declination_always
+    assert ekf2.aiding.valid_timeout == pytest.approx(4.0)
+    assert loaded.vehicle == {'fixed_wing': 1.0, 'flow_limits': (6.0, 0.0, 50.0)}
+    assert loaded.output == {'every': 5.0}
+    assert loaded.unused == ['fusion_mode bit 1 (optical flow)', 'bcoef_x']
+
+
+def test_modern_vision_control_bits() -> None:
+    values, unused = translate({'EKF2_EV_CTRL': 15, 'EKF2_HGT_REF': 1}, Ekf2Params())
+
+    assert values == {
+        'ekf2.vision.use_position': True,
+        'ekf2.vision.use_velocity': True,
+        'ekf2.vision.use_yaw': True,
+        'ekf2.height.reference': 'gnss',
+    }
+    assert unused == ['EKF2_EV_CTRL bit 1 (vision height beside the height reference)']
+
+
+def test_bits_nobody_knows_are_listed() -> None:
+    _, unused = translate({'gps_check_mask': 512}, Ekf2Params())
+    assert unused == ['gps_check_mask bit 9 (not a bit that is known)']
+
+
+def test_foreign_names_are_unique_and_translated_names_exist() -> None:
+    ours = {name for name, _, _ in leaves(Params())}
+    specs = [spec for _, _, spec in leaves(Params())]
+    for names in ([s.px4 for s in specs if s.px4], [s.ecl for s in specs if s.ecl]):
+        assert len(names) == len(set(names))
+
+    numbers = dict.fromkeys(
+        'fusion_mode gps_check_mask mag_declination_source EKF2_EV_CTRL vdist_sensor_type '
+        'mag_fusion_type check_mag_strength synthesize_mag_z valid_timeout_max '
+        'reset_timeout_max EKF2_REQ_GPS_H EKF2_IMU_POS_X EKF2_GPS_POS_Y EKF2_EV_POS_Z'.split(), 1)
+    values, _ = translate(numbers, Ekf2Params())
+    assert set(values) <= ours
+
+
+def test_defaults_are_those_of_the_reference_battery(shared: Path) -> None:
+    """The table of defaults that the reference filter was run with (FORMAT.md section 6)."""
+    text = (shared / 'reference' / 'battery' / 'FORMAT.md').read_text(encoding='utf-8')
+    by_ecl_name = {spec.ecl: value for _, value, spec in leaves(Ekf2Params()) if spec.ecl}
+    compared = 0
+    for line in text[text.index('## 6.'):].splitlines():
+        for half in line.strip('|').split('||'):
+            cells = [cell.strip() for cell in half.split('|')]
+            value = by_ecl_name.get(cells[0])
+            if isinstance(value, float) and len(cells) > 1:
+                assert value == pytest.approx(float(cells[1].split()[0])), cells[0]
+                compared += 1
+    assert compared > 40
