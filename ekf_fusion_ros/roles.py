@@ -57,7 +57,7 @@ def _wanted(params: Params, roles: Collection[str]) -> dict[str, dict[str, Any]]
     """Return the values these roles call for, by group of ekf2."""
     has_fix = FIX in roles
     wanted: dict[str, dict[str, Any]] = {
-        'timing': {'horizon_min_ms': params.session.horizon_ms},
+        'timing': {'horizon_min_ms': _horizon_ms(params)},
         'gnss': {'enabled': has_fix},
     }
     if PRESSURE not in roles:
@@ -76,3 +76,10 @@ def _wanted(params: Params, roles: Collection[str]) -> dict[str, dict[str, Any]]
         # The odometry's velocity increments carry no accelerometer bias.
         wanted['imu'] = {'inhibit_accel_bias': True}
     return wanted
+
+
+def _horizon_ms(params: Params) -> float:
+    """Return a horizon behind every delay in use and the hold of the session."""
+    session, ekf2 = params.session, params.ekf2
+    delays = (ekf2.gnss.delay_ms, ekf2.mag.delay_ms, ekf2.baro.delay_ms, session.odometry_delay_ms)
+    return max(session.horizon_ms, max(delays) + 2.0 * session.hold_ms)

@@ -18,6 +18,7 @@ from ekf_fusion_ros.estimator import GeoPoint
 from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import HealthLevel
 from ekf_fusion_ros.estimator import NavState
+from ekf_fusion_ros.holding import Holding
 from ekf_fusion_ros.inputs import InertialInput
 from ekf_fusion_ros.inputs import decoder_of
 from ekf_fusion_ros.messages.refusal import Refused
@@ -129,6 +130,7 @@ class FusionSession:
         self._inertial_order = InertialOrder(round(SECOND_US * session.stamp_gap_max))
         self._aiding_order = {role: self._new_order() for role in roles}
         self._heading = OdometryHeading()
+        self._holding = Holding(round(1000 * session.hold_ms))
         self._pairing = self._new_pairing() if FIX_VELOCITY in roles else None
         self._inertial = InertialInput(self.params, self._inertial_role) if roles else None
         self._motion = make_motion_heading(self.params, roles)
@@ -189,11 +191,12 @@ class FusionSession:
         self._statistics[role].received += 1
         self._count_refusal(role, reason, detail)
 
-    def finish(self) -> list[FusedOutput]:
-        """Take in what still waits for a partner; after this the counts are complete."""
-        for fix in self._pairing.flush() if self._pairing else ():
-            self._push_fix(fix)
-        return []
+    def finish(self) -> None:
+        """Take in what is still held or waits for a partner; after this the counts are exact."""
+        for role, sample in self._holding.flush():
+            self._aid(role, sample)
+        if self._pairing is not None:
+            self._push_fixes(self._pairing.flush())
 
     def _push_directly(self, sample: Sample) -> list[FusedOutput]:
         if isinstance(sample, ImuSample):
@@ -219,27 +222,36 @@ class FusionSession:
             self._inertial_order.judge(time_us)
 
     def _accept(self, role: str, sample: Any) -> list[FusedOutput]:
-        if role == FIX_VELOCITY:
-            self._push_fixes(self._paired().push_velocity(sample))
-            return []
-        self._statistics[role].accepted += 1
+        if role != FIX_VELOCITY:
+            self._statistics[role].accepted += 1
+        if role == self._inertial_role:
+            return self._run(role, sample)
         if role == FIX:
-            self._accept_fix(sample)
-        elif role == ODOMETRY:
-            self._accept_odometry(sample)
-        elif role != IMU:
-            self._estimator.push(sample)
-        return self._run(sample) if role == self._inertial_role else []
+            sample = self._with_height(sample)
+        self._holding.push(role, sample)
+        for due in self._holding.release(self._now_us):
+            self._aid(*due)
+        return []
 
-    def _accept_fix(self, fix: GnssSample) -> None:
+    def _with_height(self, fix: GnssSample) -> GnssSample:
         if math.isfinite(fix.alt):
             self._last_altitude = fix.alt
-        else:
-            # A fix without height still places the vehicle; its height must carry no weight.
-            fix = replace(fix, alt=self._last_altitude, epv=NO_HEIGHT_EPV)
-        self._push_fixes(self._pairing.push_fix(fix) if self._pairing else [fix])
+            return fix
+        # A fix without height still places the vehicle; its height must carry no weight.
+        return replace(fix, alt=self._last_altitude, epv=NO_HEIGHT_EPV)
 
-    def _accept_odometry(self, sample: VisionSample) -> None:
+    def _aid(self, role: str, sample: Any) -> None:
+        """Hand an aiding sample to the estimator and to what looks for yaw in motion."""
+        if role == FIX_VELOCITY:
+            self._push_fixes(self._paired().push_velocity(sample))
+        elif role == FIX:
+            self._push_fixes(self._pairing.push_fix(sample) if self._pairing else [sample])
+        elif role == ODOMETRY:
+            self._push_odometry(sample)
+        else:
+            self._estimator.push(sample)
+
+    def _push_odometry(self, sample: VisionSample) -> None:
         self._heading.push(sample)
         if self._motion is not None:
             self._motion.push_odometry(sample)
@@ -262,12 +274,17 @@ class FusionSession:
 
     # -- time --------------------------------------------------------------------------------
 
-    def _run(self, reading: Any) -> list[FusedOutput]:
+    def _run(self, role: str, reading: Any) -> list[FusedOutput]:
+        """Step through the increments that end with a message of the inertial role."""
         assert self._inertial is not None
+        if role == ODOMETRY:
+            self._push_odometry(reading)
         outputs: list[FusedOutput] = []
         for imu in self._inertial.push(reading):
             if self._now_us is None and self.params.session.assume_in_air:
                 self._estimator.push(LandedSample(imu.time_us, landed=False))
+            for due in self._holding.release(imu.time_us):
+                self._aid(*due)
             if self._pairing is not None:
                 self._push_fixes(self._pairing.advance(imu.time_us))
             outputs += self._advance(imu)
@@ -293,8 +310,7 @@ class FusionSession:
         return [FusedOutput(nav, self._local, fixes)]
 
     def _restart(self) -> None:
-        for fix in self._pairing.flush() if self._pairing else ():
-            self._push_fix(fix)
+        self.finish()
         self._collect()
         self._estimator.reset()
         self._forget()

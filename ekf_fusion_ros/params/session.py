@@ -23,6 +23,9 @@ class SessionParams:
     horizon_ms: float = param(
         200.0, 'Shortest delay of the fusion horizon: the time by which messages may be late '
         'after their stamp.', unit='ms', min=0, max=2000)
+    hold_ms: float = param(
+        20.0, 'Time for which aiding messages are held to bring them into the order of their '
+        'stamps, whatever the order of arrival.', unit='ms', min=0, max=1000)
     odometry_delay_ms: float = param(
         0.0, 'Delay of odometry stamps against the inertial input; a stamp by REP-103 habit is '
         'the time of measurement. Replaces the default of ekf2.vision.delay_ms.', unit='ms',

@@ -1,0 +1,44 @@
+"""Puts aiding samples into the order of their stamps before they meet inertial time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import heapq
+from typing import Any
+
+from ekf_fusion_ros.roles import SUPPORTED
+
+HELD_MAX = 1000
+RANK = {role: rank for rank, role in enumerate(SUPPORTED)}
+
+
+class Holding:
+    """Holds aiding samples until inertial time is `hold_us` past their stamp.
+
+    Middleware does not keep the order of messages across topics. Held this long, and ordered by
+    stamp and role, they reach the estimator in one order however they arrived, so that node
+    and replay give the same numbers. The fusion horizon lies further back than the hold.
+    """
+
+    def __init__(self, hold_us: int) -> None:
+        self._hold_us = hold_us
+        self._heap: list[tuple[int, int, int, str, Any]] = []
+        self._sequence = 0
+
+    def push(self, role: str, sample: Any) -> None:
+        """Hold a sample."""
+        self._sequence += 1
+        entry = (sample.time_us, RANK[role], self._sequence, role, sample)
+        heapq.heappush(self._heap, entry)
+
+    def release(self, now_us: int | None) -> Iterator[tuple[str, Any]]:
+        """Yield what is due before the inertial stamp `now_us`; None: before there is one."""
+        limit = -1 if now_us is None else now_us - self._hold_us
+        heap = self._heap
+        while heap and (heap[0][0] <= limit or len(heap) > HELD_MAX):
+            yield heapq.heappop(heap)[3:]
+
+    def flush(self) -> Iterator[tuple[str, Any]]:
+        """Yield everything, oldest stamp first."""
+        while self._heap:
+            yield heapq.heappop(self._heap)[3:]
