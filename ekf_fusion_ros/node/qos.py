@@ -1,0 +1,30 @@
+"""Quality of service of the node's topics.
+
+Inputs are best effort, so that they match every publisher; outputs are reliable, because MAVROS
+and navigation stacks subscribe with the default reliability. Each entity can be overridden by
+the `qos_overrides.*` parameters of ROS 2.
+"""
+
+from __future__ import annotations
+
+from rclpy.qos import HistoryPolicy
+from rclpy.qos import QoSProfile
+from rclpy.qos import ReliabilityPolicy
+
+SENSOR_DEPTH = 10
+IMU_DEPTH = 100
+OUTPUT_DEPTH = 10
+
+
+def input_qos(role: str) -> QoSProfile:
+    """Return the profile of the subscription that serves a role."""
+    depth = IMU_DEPTH if role == 'imu' else SENSOR_DEPTH
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST, depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+def output_qos() -> QoSProfile:
+    """Return the profile of the published estimates."""
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST, depth=OUTPUT_DEPTH,
+        reliability=ReliabilityPolicy.RELIABLE)

@@ -1,0 +1,60 @@
+"""Reports: one sentence, a level and exact counts."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from ekf_fusion_ros.estimator import Health
+from ekf_fusion_ros.estimator import HealthLevel
+from ekf_fusion_ros.node.diagnostics import estimator_report
+from ekf_fusion_ros.node.diagnostics import TopicWatch
+from ekf_fusion_ros.statistics import RoleStatistics
+
+
+def test_silent_topic_is_named() -> None:
+    report = TopicWatch('fix', '/gps/fix').report(RoleStatistics())
+    assert report.level == HealthLevel.WARN
+    assert report.text == 'nothing received on /gps/fix yet'
+
+
+def test_counts_and_reasons_are_reported() -> None:
+    counts = RoleStatistics(received=10, accepted=7)
+    counts.refuse('no_fix', 'the receiver says so')
+    counts.refuse('no_fix')
+    counts.refuse('bad_latitude', 'latitude 91')
+    report = TopicWatch('fix', '/fix').report(counts)
+    assert report.values['received'] == '10'
+    assert report.values['accepted'] == '7'
+    assert report.values['refused'] == '3'
+    assert report.values['refused.no_fix'] == '2'
+    assert report.values['detail.no_fix'] == 'the receiver says so'
+    assert report.text == '10 received on /fix, 1 refused: bad_latitude, 2 refused: no_fix'
+
+
+def test_level_follows_what_is_new() -> None:
+    watch = TopicWatch('fix', '/fix')
+    counts = RoleStatistics(received=5, accepted=4)
+    counts.refuse('no_fix')
+    levels = [watch.report(counts).level]
+    counts.received, counts.accepted = 7, 6
+    levels.append(watch.report(counts).level)
+    silent = watch.report(counts)
+    levels.append(silent.level)
+    assert levels == [HealthLevel.WARN, HealthLevel.OK, HealthLevel.WARN]
+    assert 'none since the last report' in silent.text
+
+
+def test_trouble_of_the_node_raises_the_level() -> None:
+    health = Health(HealthLevel.OK, 'ok: gnss position', {'horizon': '0.2'})
+    assert estimator_report(health, {'stalls': 0}).level == HealthLevel.OK
+    troubled = estimator_report(health, {'internal_errors': 2, 'stalls': 0})
+    assert troubled.level == HealthLevel.WARN
+    assert troubled.text == 'ok: gnss position; in the node: 2 internal errors'
+    assert troubled.values == {'horizon': '0.2', 'internal_errors': '2', 'stalls': '0'}
+
+
+def test_trouble_does_not_hide_an_error() -> None:
+    health = Health(HealthLevel.ERROR, 'filter fault', {})
+    assert estimator_report(health, {'stalls': 1}).level == HealthLevel.ERROR
