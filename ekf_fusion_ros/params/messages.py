@@ -104,8 +104,18 @@ class MagneticFieldMessageParams:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PressureMessageParams:
+    """FluidPressure: limits of a believable reading."""
+
+    min_pressure: float = param(
+        1000.0, 'Smallest believable pressure; refuses hPa.', unit='Pa', min=1, max=1e5)
+    max_pressure: float = param(
+        120000.0, 'Largest believable pressure.', unit='Pa', min=1e5, max=1e7)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MessageParams:
-    """What the messages of each role mean."""
+    """What the messages of each role mean; the groups bear the names of the roles."""
 
     odometry: OdometryMessageParams = field(default_factory=OdometryMessageParams)
     fix: FixMessageParams = field(default_factory=FixMessageParams)
@@ -113,3 +123,4 @@ class MessageParams:
     imu: ImuMessageParams = field(default_factory=ImuMessageParams)
     magnetic_field: MagneticFieldMessageParams = field(
         default_factory=MagneticFieldMessageParams)
+    pressure: PressureMessageParams = field(default_factory=PressureMessageParams)

@@ -1,0 +1,138 @@
+"""nav_msgs/Odometry to VisionSample, converted as MAVROS and PX4 do."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ekf_fusion_ros import frames
+from ekf_fusion_ros.mathlib.rotation import quat_multiply
+from ekf_fusion_ros.messages import fields
+from ekf_fusion_ros.messages.mounting import body_to_sensor_quaternion
+from ekf_fusion_ros.messages.mounting import sensor_to_body
+from ekf_fusion_ros.messages.refusal import Refused
+from ekf_fusion_ros.messages.stamps import stamp_of
+from ekf_fusion_ros.params.messages import ZERO
+from ekf_fusion_ros.params.messages import OdometryMessageParams
+from ekf_fusion_ros.samples import NAN3
+from ekf_fusion_ros.samples import NAN4
+from ekf_fusion_ros.samples import VelocityFrame
+from ekf_fusion_ros.samples import VisionSample
+
+Array = NDArray[np.float64]
+
+MAX_POSITION = 1e8
+MAX_VELOCITY = 1e3
+
+POSITION_PRIMARY = (True, True, False)
+VELOCITY_PRIMARY = (True, False, False)
+ROTATION_PRIMARY = (False, False, True)
+
+
+def decode_odometry(message: Any, params: OdometryMessageParams) -> VisionSample:
+    """Return an Odometry message as a sample in NED/FRD, velocity in the body frame (FRD).
+
+    Not measured are: the whole position when x or y is not, height (NaN z) alone; the
+    orientation when yaw is not; the velocity when the sensor's x axis is not. An orientation
+    whose roll or pitch is not measured keeps its yaw and is level. A body velocity axis that is
+    not measured beside a measured x is 0 with `lateral_velocity_noise`. Raises Refused.
+    """
+    time_us = stamp_of(message)
+    kind = parent_kind(message.header.frame_id, params)
+    covariance = fields.matrix(message.pose.covariance, 6, 'pose.covariance')
+    position, position_var = _position(message, covariance[:3, :3], kind, params)
+    quaternion, angular_var = _orientation(message, covariance[3:, 3:], kind, params)
+    velocity, velocity_cov = _velocity(message, params)
+    if math.isnan(position[0]) and math.isnan(quaternion[0]) and math.isnan(velocity[0]):
+        raise Refused(
+            'not_measured', 'all variances say that nothing was measured: neither position nor '
+            f'orientation nor velocity is below {params.unmeasured_variance:g}')
+    return VisionSample(
+        time_us, position, quaternion, velocity, position_var, velocity_cov, angular_var,
+        VelocityFrame.BODY_FRD)
+
+
+def parent_kind(frame_id: str, params: OdometryMessageParams) -> str:
+    """Return 'enu', 'ned' or 'frd' for the parent frame.
+
+    Raises Refused 'frame_contradiction' when the name does not agree with the configured frame.
+    """
+    kind = frames.frame_kind(frame_id)
+    if params.frame not in ('auto', kind):
+        meaning = 'ENU/FLU' if kind == 'enu' else kind.upper()
+        raise Refused(
+            'frame_contradiction',
+            f'header.frame_id {frame_id!r} means {meaning}, but odometry.frame is '
+            f'{params.frame}: rename the frame (suffix _ned or _frd) or change the parameter')
+    return kind
+
+
+def has_true_heading(params: OdometryMessageParams) -> bool:
+    """True where the odometry frame is declared to be aligned with true north."""
+    return params.true_heading or params.frame == 'ned'
+
+
+def _position(
+        message: Any, block: Array, kind: str,
+        params: OdometryMessageParams) -> tuple[Array, Array]:
+    covariance, measured = fields.measured_block(
+        block, POSITION_PRIMARY, params.position_noise ** 2, params.unmeasured_variance,
+        'pose.covariance')
+    if not (measured[0] and measured[1]):
+        return NAN3, np.full(3, params.unmeasured_variance)
+    position = fields.vector(
+        message.pose.pose.position, 'pose.pose.position', MAX_POSITION, measured)
+    if kind == 'enu':
+        position = frames.swap_enu_ned(position)
+        covariance = frames.rotate_covariance(covariance, frames.NED_ENU)
+    variance = covariance.diagonal().copy()
+    if not measured[2]:
+        position[2] = math.nan
+        variance[2] = params.unmeasured_variance
+    return position, variance
+
+
+def _orientation(
+        message: Any, block: Array, kind: str,
+        params: OdometryMessageParams) -> tuple[Array, float]:
+    covariance, measured = fields.measured_block(
+        block, ROTATION_PRIMARY, params.yaw_noise ** 2, params.unmeasured_variance,
+        'pose.covariance')
+    if not measured[2]:
+        return NAN4, params.unmeasured_variance
+    quaternion = fields.unit_quaternion(
+        message.pose.pose.orientation, 'pose.pose.orientation')
+    child_is_flu = frames.frame_kind(message.child_frame_id) == 'enu'
+    if kind == 'enu' and child_is_flu:
+        quaternion = frames.swap_attitude(quaternion)
+    elif kind == 'enu':
+        quaternion = frames.swap_attitude_parent(quaternion)
+    elif child_is_flu:
+        quaternion = frames.swap_attitude_child(quaternion)
+    if params.mount_rpy != ZERO:
+        quaternion = quat_multiply(quaternion, body_to_sensor_quaternion(params.mount_rpy))
+    if not (measured[0] and measured[1]):
+        quaternion = _levelled(quaternion)
+    return quaternion, float(covariance[2, 2])
+
+
+def _velocity(message: Any, params: OdometryMessageParams) -> tuple[Array, Array]:
+    twist = message.twist
+    covariance, measured = fields.measured_block(
+        fields.matrix(twist.covariance, 6, 'twist.covariance')[:3, :3], VELOCITY_PRIMARY,
+        params.velocity_noise ** 2, params.unmeasured_variance, 'twist.covariance')
+    if not measured[0]:
+        return NAN3, params.unmeasured_variance * np.eye(3)
+    velocity = fields.vector(twist.twist.linear, 'twist.twist.linear', MAX_VELOCITY, measured)
+    covariance[~measured, ~measured] = params.lateral_velocity_noise ** 2
+    rotation = sensor_to_body(params.mount_rpy, message.child_frame_id)
+    return rotation @ velocity, frames.rotate_covariance(covariance, rotation)
+
+
+def _levelled(quaternion: Array) -> Array:
+    w, x, y, z = quaternion.tolist()
+    half_yaw = 0.5 * math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return np.array((math.cos(half_yaw), 0.0, 0.0, math.sin(half_yaw)))
