@@ -42,12 +42,14 @@ def frame_kind(frame_id: str) -> str:
 
 def swap_enu_ned(vector: Array) -> Array:
     """Return a vector (3,) of ENU in NED or the other way."""
-    return np.array((vector[1], vector[0], -vector[2]))
+    x, y, z = vector.tolist()
+    return np.array((y, x, -z))
 
 
 def swap_flu_frd(vector: Array) -> Array:
     """Return a vector (3,) of FLU in FRD or the other way."""
-    return np.array((vector[0], -vector[1], -vector[2]))
+    x, y, z = vector.tolist()
+    return np.array((x, -y, -z))
 
 
 def swap_yaw_enu_ned(yaw: float) -> float:
@@ -60,19 +62,19 @@ def swap_yaw_enu_ned(yaw: float) -> float:
 
 def swap_attitude(quaternion: Array) -> Array:
     """Return FLU -> ENU (4,) as FRD -> NED or the other way: R q A'."""
-    w, x, y, z = quaternion
+    w, x, y, z = quaternion.tolist()
     return _HALF_SQRT * np.array((w + z, x + y, x - y, w - z))
 
 
 def swap_attitude_parent(quaternion: Array) -> Array:
     """Return body -> ENU (4,) as body -> NED or the other way, same body axes: R q."""
-    w, x, y, z = quaternion
+    w, x, y, z = quaternion.tolist()
     return _HALF_SQRT * np.array((-x - y, w + z, w - z, y - x))
 
 
 def swap_attitude_child(quaternion: Array) -> Array:
     """Return FLU -> earth (4,) as FRD -> earth or the other way, same earth axes: q A'."""
-    w, x, y, z = quaternion
+    w, x, y, z = quaternion.tolist()
     return np.array((-x, w, z, -y))
 
 

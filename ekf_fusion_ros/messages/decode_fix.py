@@ -14,7 +14,7 @@ from ekf_fusion_ros.messages import fields
 from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.messages.stamps import stamp_of
 from ekf_fusion_ros.params.messages import FixMessageParams
-from ekf_fusion_ros.params.messages import FixVelocityMessageParams
+from ekf_fusion_ros.params.messages import MessageParams
 from ekf_fusion_ros.samples import GnssSample
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ class FixVelocity(NamedTuple):
     accuracy: float
 
 
-def decode_fix(message: Any, params: FixMessageParams) -> GnssSample:
+def decode_fix(message: Any, params: MessageParams) -> GnssSample:
     """Return a NavSatFix as a sample without velocity.
 
     A NaN altitude stays NaN: latitude and longitude are good without it. Satellites and PDOP are
@@ -55,12 +55,12 @@ def decode_fix(message: Any, params: FixMessageParams) -> GnssSample:
         raise Refused('bad_longitude', f'longitude is {lon:g} deg: beyond 180')
     if abs(alt) > MAX_ALTITUDE:
         raise Refused('bad_altitude', f'altitude is {alt:g} m: beyond {MAX_ALTITUDE:g}')
-    eph, epv = accuracies(message, params)
+    eph, epv = accuracies(message, params.fix)
     return GnssSample(
         time_us, float(lat), float(lon), float(alt), eph, epv, fix_type=fix_type)
 
 
-def decode_fix_velocity(message: Any, params: FixVelocityMessageParams) -> FixVelocity:
+def decode_fix_velocity(message: Any, params: MessageParams) -> FixVelocity:
     """Return a TwistStamped or TwistWithCovarianceStamped as a velocity in NED.
 
     The velocity is ENU unless the frame name ends in _ned. The accuracy is that of the worst
@@ -80,8 +80,8 @@ def decode_fix_velocity(message: Any, params: FixVelocityMessageParams) -> FixVe
     if variance >= UNMEASURED_VARIANCE:
         raise Refused(
             'not_measured', f'twist.covariance says that an axis was not measured: {variance:g}')
-    accuracy = math.sqrt(variance) or params.default_accuracy
-    return FixVelocity(time_us, velocity, max(accuracy, params.min_accuracy))
+    accuracy = math.sqrt(variance) or params.fix_velocity.default_accuracy
+    return FixVelocity(time_us, velocity, max(accuracy, params.fix_velocity.min_accuracy))
 
 
 def accuracies(message: Any, params: FixMessageParams) -> tuple[float, float]:

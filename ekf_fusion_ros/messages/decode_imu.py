@@ -17,6 +17,7 @@ from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.messages.stamps import stamp_of
 from ekf_fusion_ros.params.messages import ZERO
 from ekf_fusion_ros.params.messages import ImuMessageParams
+from ekf_fusion_ros.params.messages import MessageParams
 from ekf_fusion_ros.samples import ImuSample
 
 Array = NDArray[np.float64]
@@ -37,7 +38,7 @@ class ImuReading:
     orientation: Array | None = None
 
 
-def decode_imu(message: Any, params: ImuMessageParams) -> ImuReading:
+def decode_imu(message: Any, params: MessageParams) -> ImuReading:
     """Return an Imu message as a reading, by REP-145.
 
     A first covariance element of -1 means that the field is absent, all zero that its noise is
@@ -47,11 +48,12 @@ def decode_imu(message: Any, params: ImuMessageParams) -> ImuReading:
     time_us = stamp_of(message)
     _check_present(message.angular_velocity_covariance, 'angular_velocity')
     _check_present(message.linear_acceleration_covariance, 'linear_acceleration')
-    rate = fields.vector(message.angular_velocity, 'angular_velocity', params.max_rate)
+    rate = fields.vector(message.angular_velocity, 'angular_velocity', params.imu.max_rate)
     force = fields.vector(
-        message.linear_acceleration, 'linear_acceleration', params.max_acceleration)
-    rotation = sensor_to_body(params.mount_rpy, message.header.frame_id)
-    return ImuReading(time_us, rotation @ rate, rotation @ force, _orientation(message, params))
+        message.linear_acceleration, 'linear_acceleration', params.imu.max_acceleration)
+    rotation = sensor_to_body(params.imu.mount_rpy, message.header.frame_id)
+    orientation = _orientation(message, params.imu)
+    return ImuReading(time_us, rotation @ rate, rotation @ force, orientation)
 
 
 class ImuIntegrator:
@@ -62,9 +64,9 @@ class ImuIntegrator:
     but counts as one ordinary interval.
     """
 
-    def __init__(self, max_gap: float) -> None:
-        """Take the longest interval that one reading may fill, in s."""
-        self._max_gap_us = round(max_gap * 1e6)
+    def __init__(self, params: MessageParams) -> None:
+        """Take `imu.max_gap`, the longest interval that one reading may fill."""
+        self._max_gap_us = round(params.imu.max_gap * 1e6)
         self.gaps = 0
         self.reset()
 

@@ -16,6 +16,7 @@ from ekf_fusion_ros.messages.mounting import sensor_to_body
 from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.messages.stamps import stamp_of
 from ekf_fusion_ros.params.messages import ZERO
+from ekf_fusion_ros.params.messages import MessageParams
 from ekf_fusion_ros.params.messages import OdometryMessageParams
 from ekf_fusion_ros.samples import NAN3
 from ekf_fusion_ros.samples import NAN4
@@ -32,7 +33,7 @@ VELOCITY_PRIMARY = (True, False, False)
 ROTATION_PRIMARY = (False, False, True)
 
 
-def decode_odometry(message: Any, params: OdometryMessageParams) -> VisionSample:
+def decode_odometry(message: Any, params: MessageParams) -> VisionSample:
     """Return an Odometry message as a sample in NED/FRD, velocity in the body frame (FRD).
 
     Not measured are: the whole position when x or y is not, height (NaN z) alone; the
@@ -40,16 +41,17 @@ def decode_odometry(message: Any, params: OdometryMessageParams) -> VisionSample
     whose roll or pitch is not measured keeps its yaw and is level. A body velocity axis that is
     not measured beside a measured x is 0 with `lateral_velocity_noise`. Raises Refused.
     """
+    odometry = params.odometry
     time_us = stamp_of(message)
-    kind = parent_kind(message.header.frame_id, params)
-    covariance = fields.matrix(message.pose.covariance, 6, 'pose.covariance')
-    position, position_var = _position(message, covariance[:3, :3], kind, params)
-    quaternion, angular_var = _orientation(message, covariance[3:, 3:], kind, params)
-    velocity, velocity_cov = _velocity(message, params)
+    kind = parent_kind(message.header.frame_id, odometry)
+    flat = fields.flat_covariance(message.pose.covariance, 'pose.covariance')
+    position, position_var = _position(message, flat, kind, odometry)
+    quaternion, angular_var = _orientation(message, flat, kind, odometry)
+    velocity, velocity_cov = _velocity(message, odometry)
     if math.isnan(position[0]) and math.isnan(quaternion[0]) and math.isnan(velocity[0]):
         raise Refused(
             'not_measured', 'all variances say that nothing was measured: neither position nor '
-            f'orientation nor velocity is below {params.unmeasured_variance:g}')
+            f'orientation nor velocity is below {odometry.unmeasured_variance:g}')
     return VisionSample(
         time_us, position, quaternion, velocity, position_var, velocity_cov, angular_var,
         VelocityFrame.BODY_FRD)
@@ -65,7 +67,7 @@ def parent_kind(frame_id: str, params: OdometryMessageParams) -> str:
         meaning = 'ENU/FLU' if kind == 'enu' else kind.upper()
         raise Refused(
             'frame_contradiction',
-            f'header.frame_id {frame_id!r} means {meaning}, but odometry.frame is '
+            f'header.frame_id {frame_id!r} means {meaning}, but messages.odometry.frame is '
             f'{params.frame}: rename the frame (suffix _ned or _frd) or change the parameter')
     return kind
 
@@ -76,10 +78,10 @@ def has_true_heading(params: OdometryMessageParams) -> bool:
 
 
 def _position(
-        message: Any, block: Array, kind: str,
+        message: Any, flat: list[float], kind: str,
         params: OdometryMessageParams) -> tuple[Array, Array]:
     covariance, measured = fields.measured_block(
-        block, POSITION_PRIMARY, params.position_noise ** 2, params.unmeasured_variance,
+        flat, 0, POSITION_PRIMARY, params.position_noise ** 2, params.unmeasured_variance,
         'pose.covariance')
     if not (measured[0] and measured[1]):
         return NAN3, np.full(3, params.unmeasured_variance)
@@ -96,10 +98,10 @@ def _position(
 
 
 def _orientation(
-        message: Any, block: Array, kind: str,
+        message: Any, flat: list[float], kind: str,
         params: OdometryMessageParams) -> tuple[Array, float]:
     covariance, measured = fields.measured_block(
-        block, ROTATION_PRIMARY, params.yaw_noise ** 2, params.unmeasured_variance,
+        flat, 3, ROTATION_PRIMARY, params.yaw_noise ** 2, params.unmeasured_variance,
         'pose.covariance')
     if not measured[2]:
         return NAN4, params.unmeasured_variance
@@ -121,13 +123,16 @@ def _orientation(
 
 def _velocity(message: Any, params: OdometryMessageParams) -> tuple[Array, Array]:
     twist = message.twist
+    flat = fields.flat_covariance(twist.covariance, 'twist.covariance')
     covariance, measured = fields.measured_block(
-        fields.matrix(twist.covariance, 6, 'twist.covariance')[:3, :3], VELOCITY_PRIMARY,
-        params.velocity_noise ** 2, params.unmeasured_variance, 'twist.covariance')
+        flat, 0, VELOCITY_PRIMARY, params.velocity_noise ** 2, params.unmeasured_variance,
+        'twist.covariance')
     if not measured[0]:
         return NAN3, params.unmeasured_variance * np.eye(3)
     velocity = fields.vector(twist.twist.linear, 'twist.twist.linear', MAX_VELOCITY, measured)
-    covariance[~measured, ~measured] = params.lateral_velocity_noise ** 2
+    for axis in (1, 2):
+        if not measured[axis]:
+            covariance[axis, axis] = params.lateral_velocity_noise ** 2
     rotation = sensor_to_body(params.mount_rpy, message.child_frame_id)
     return rotation @ velocity, frames.rotate_covariance(covariance, rotation)
 

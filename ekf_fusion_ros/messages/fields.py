@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ekf_fusion_ros.messages.refusal import Refused
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+Mask = tuple[bool, bool, bool]
 
 QUATERNION_NORM_ERROR = 0.1
 
@@ -22,7 +22,7 @@ def vector(value: Any, name: str, limit: float, measured: Mask | None = None) ->
     Raises Refused 'not_finite', or 'out_of_range' when an element is beyond `limit`.
     """
     x, y, z = value.x, value.y, value.z
-    if measured is not None and not measured.all():
+    if measured is not None and not all(measured):
         x, y, z = (e if known else 0.0 for e, known in zip((x, y, z), measured, strict=True))
     # One comparison catches NaN too.
     if not (-limit <= x <= limit and -limit <= y <= limit and -limit <= z <= limit):
@@ -63,42 +63,50 @@ def check_variances(covariance: Any, indices: tuple[int, ...], name: str) -> Non
             raise Refused(reason, f'{name}[{index}] is {variance:g}: a variance must be 0 or more')
 
 
-def matrix(covariance: Any, size: int, name: str) -> Array:
-    """Return a row-major covariance field as (size, size).
+def flat_covariance(covariance: Any, name: str) -> list[float]:
+    """Return a 6x6 row-major covariance field as 36 numbers.
 
-    Raises Refused 'bad_covariance' when its length is wrong, 'nan_covariance' for any NaN and
-    'negative_covariance' for a negative diagonal element.
+    Raises Refused 'bad_covariance' when there are not 36, 'nan_covariance' for any NaN and
+    'negative_covariance' for a negative variance.
     """
-    full = np.asarray(covariance, dtype=np.float64)
-    if full.size != size * size:
-        raise Refused('bad_covariance', f'{name} has {full.size} elements, not {size * size}')
-    full = full.reshape(size, size)
-    if np.isnan(full).any():
+    flat = np.asarray(covariance, dtype=np.float64).ravel().tolist()
+    if len(flat) != 36:
+        raise Refused('bad_covariance', f'{name} has {len(flat)} elements, not 36')
+    # The sum is NaN with any element, and far quicker than 36 tests.
+    if math.isnan(sum(flat)) and any(map(math.isnan, flat)):
         raise Refused('nan_covariance', f'{name} holds NaN')
-    if (full.diagonal() < 0.0).any():
+    if min(flat[::7]) < 0.0:
         raise Refused('negative_covariance', f'{name} has a negative variance')
-    return full
+    return flat
 
 
 def measured_block(
-        block: Array, primary: tuple[bool, bool, bool], default: float, limit: float,
+        flat: list[float], first: int, primary: Mask, default: float, limit: float,
         name: str) -> tuple[Array, Mask]:
-    """Return the covariance (3, 3) of the measured axes and which axes (3,) are measured.
+    """Return the covariance (3, 3) of the measured axes and which of the axes are measured.
 
-    Variances from `limit` up, infinity too, mean not measured. Zero means unknown: such an axis
-    gets the `default` variance, but where other axes of the block carry a variance only the
-    `primary` axes do, since a planar odometry leaves zeros on the axes it does not measure. Rows
-    and columns of axes that are not measured are zero. Raises Refused 'indefinite_covariance'
-    when a correlation is beyond 1.
+    The block begins at row and column `first` of the 36 numbers. Variances from `limit` up,
+    infinity too, mean not measured. Zero means unknown: such an axis gets the `default` variance,
+    but where other axes of the block carry a variance only the `primary` axes do, since a planar
+    odometry leaves zeros on the axes it does not measure. Rows and columns of axes that are not
+    measured are zero. Raises Refused 'indefinite_covariance' when a correlation is beyond 1.
     """
-    variance = block.diagonal()
-    known = (variance > 0.0) & (variance < limit)
-    unknown = variance == 0.0
-    if known.any():
-        unknown = unknown & primary
-    cleaned = np.where(np.outer(known, known), 0.5 * block + 0.5 * block.T, 0.0)
-    sigma = np.sqrt(np.where(known, variance, 0.0))
-    if not (np.abs(cleaned) <= 1.0005 * np.outer(sigma, sigma)).all():
-        raise Refused('indefinite_covariance', f'{name} has a correlation beyond 1')
-    cleaned[unknown, unknown] = default
-    return cleaned, known | unknown
+    variance = flat[7 * first:7 * first + 15:7]
+    known = [0.0 < v < limit for v in variance]
+    some = any(known)
+    block = np.zeros((3, 3))
+    measured = list(known)
+    for i in range(3):
+        if known[i]:
+            block[i, i] = variance[i]
+        elif variance[i] == 0.0 and (primary[i] or not some):
+            block[i, i] = default
+            measured[i] = True
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        upper, lower = flat[6 * (first + i) + first + j], flat[6 * (first + j) + first + i]
+        if known[i] and known[j] and (upper or lower):
+            mean = 0.5 * upper + 0.5 * lower
+            if not abs(mean) <= 1.0005 * math.sqrt(variance[i] * variance[j]):
+                raise Refused('indefinite_covariance', f'{name} has a correlation beyond 1')
+            block[i, j] = block[j, i] = mean
+    return block, (measured[0], measured[1], measured[2])

@@ -1,0 +1,26 @@
+"""sensor_msgs/FluidPressure to BaroSample."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from ekf_fusion_ros.geo.atmosphere import pressure_altitude
+from ekf_fusion_ros.messages.refusal import Refused
+from ekf_fusion_ros.messages.stamps import stamp_of
+from ekf_fusion_ros.params.messages import MessageParams
+from ekf_fusion_ros.samples import BaroSample
+
+
+def decode_pressure(message: Any, params: MessageParams) -> BaroSample:
+    """Return a FluidPressure (Pa) as pressure altitude. Raises Refused."""
+    time_us = stamp_of(message)
+    limits = params.pressure
+    pressure = message.fluid_pressure
+    if not math.isfinite(pressure):
+        raise Refused('not_finite', f'fluid_pressure is {pressure}: not finite')
+    if not limits.min_pressure <= pressure <= limits.max_pressure:
+        raise Refused(
+            'out_of_range',
+            f'fluid_pressure is {pressure:g}: not the pressure of air in Pa (hPa or mbar?)')
+    return BaroSample(time_us, pressure_altitude(float(pressure)))
