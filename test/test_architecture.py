@@ -21,7 +21,10 @@ LAYERS = (
     ('kernels',),
     ('ekf2', 'lpe', 'health', 'odometry_imu', 'motion_heading'),
     ('messages',),
-    ('session', 'holding', 'inputs', 'odometry_heading', 'pairing', 'roles', 'stamp_order', 'statistics'),
+    (
+        'session', 'holding', 'inputs', 'odometry_heading', 'pairing', 'roles', 'stamp_order',
+        'statistics',
+    ),
     ('analysis',),
     ('node', 'replay'),
     ('simulation',),

@@ -37,7 +37,7 @@ install_extras() {
     say "installing the package with [$extras] from PyPI: some minutes the first time"
     local attempt
     for attempt in 1 2; do
-        if "$python" -m pip install --quiet --disable-pip-version-check \
+        if "$python" -m pip install -qq --disable-pip-version-check \
                 --editable ".[$extras]" "${pins[@]+"${pins[@]}"}"; then
             touch "$stamp"
             return
