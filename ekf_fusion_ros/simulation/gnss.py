@@ -10,6 +10,7 @@ import numpy as np
 
 from ekf_fusion_ros.estimator import GeoPoint
 from ekf_fusion_ros.geo.projection import LocalTangent
+from ekf_fusion_ros.samples import NAN3
 from ekf_fusion_ros.samples import GnssSample
 from ekf_fusion_ros.simulation import noise
 from ekf_fusion_ros.simulation.sensor import Sensor
@@ -33,6 +34,7 @@ class Gnss(Sensor):
     correlation_time: float = 60.0
     vertical_factor: float = 1.5
     vel_noise: float = 0.1
+    has_velocity: bool = True
     nsats: int = 12
     pdop: float = 1.2
 
@@ -62,4 +64,5 @@ class Gnss(Sensor):
         sigma = max(math.hypot(self.pos_noise, self.pos_correlated), 0.01)
         return GnssSample(
             time_us, lat, lon, alt, eph=sigma, epv=self.vertical_factor * sigma,
-            velocity=velocity, sacc=max(self.vel_noise, 0.01), nsats=self.nsats, pdop=self.pdop)
+            velocity=velocity if self.has_velocity else NAN3, sacc=max(self.vel_noise, 0.01),
+            nsats=self.nsats, pdop=self.pdop)

@@ -212,8 +212,7 @@ class Flight(FigureOfEight):
         north, east, down = super().position(t)
         up = series.step((t - self.takeoff) / self.climb_time)
         down_again = series.step((t - self._touch_down + 15.0) / 15.0)
-        lift = self.height * (up - down_again)
-        return [north, east, down + self.height - lift]
+        return [north, east, down * (up - down_again)]
 
     @property
     def _touch_down(self) -> float:
