@@ -51,7 +51,8 @@ def test_wmm_gives_the_models_test_values(
     assert point.strength == pytest.approx(nanotesla * 1e-5, abs=2e-6)
 
 
-@pytest.mark.parametrize(('lat', 'lon'), [(47.4, 8.5), (-33.9, 151.2), (42.4, -71.1), (1.3, 103.8)])
+@pytest.mark.parametrize(
+    ('lat', 'lon'), [(47.4, 8.5), (-33.9, 151.2), (42.4, -71.1), (1.3, 103.8)])
 def test_table_and_model_agree_at_mid_latitudes(lat: float, lon: float) -> None:
     pytest.importorskip('pygeomag')
     table = EclFieldTable.load().lookup(lat, lon)
