@@ -14,7 +14,12 @@ extras = {
         'ros-jazzy-common-interfaces',
         'ros-jazzy-rmw-fastrtps-cpp',
     ],
-    'replay': ['rosbags>=0.10.4', 'tqdm'],
+    'replay': [
+        'rosbags>=0.11',
+        'tqdm',
+        'lz4',
+        'backports.zstd; python_version < "3.14"',
+    ],
     # numba compiles numpy's linear algebra against the BLAS that scipy carries.
     'fast': ['numba>=0.59', 'scipy'],
     'plot': ['matplotlib'],

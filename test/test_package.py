@@ -24,6 +24,7 @@ ROSDEP_KEYS = {
     'yaml': 'python3-yaml',
     'numba': 'python3-numba',
     'scipy': 'python3-scipy',
+    'lz4': 'python3-lz4',
     'rosbags': 'python3-rosbags-pip',
     'tqdm': 'python3-tqdm',
     'matplotlib': 'python3-matplotlib',
@@ -32,8 +33,8 @@ ROSDEP_KEYS = {
     'pyproj': 'python3-pyproj',
     'pytest': 'python3-pytest',
 }
-WITHOUT_KEY = {'pygeomag', 'mcap', 'setuptools'}
-"""pygeomag and mcap have no rosdep key and are optional; setuptools comes with colcon."""
+WITHOUT_KEY = {'pygeomag', 'backports', 'compression', 'setuptools'}
+"""pygeomag is optional; rosbags brings backports.zstd, Python 3.14 has it as compression."""
 
 
 def third_party(folder: Path) -> set[str]:
@@ -52,7 +53,8 @@ def third_party(folder: Path) -> set[str]:
                         first, ast.Constant):
                     names.add(str(first.value))
     roots = {name.partition('.')[0] for name in names}
-    return roots - set(sys.stdlib_module_names) - {'ekf_fusion_ros', 'test', 'conftest', ''}
+    ours = {'ekf_fusion_ros', ''} | {path.stem for path in (ROOT / 'test').rglob('*.py')}
+    return roots - set(sys.stdlib_module_names) - ours
 
 
 def declared(*tags: str) -> set[str]:
