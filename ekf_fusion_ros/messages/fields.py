@@ -44,11 +44,11 @@ def unit_quaternion(value: Any, name: str) -> Array:
     Raises Refused 'not_finite', 'zero_quaternion', or 'bad_quaternion' when its length is more
     than 0.1 away from 1; smaller errors are normalised.
     """
-    q = np.array((value.w, value.x, value.y, value.z), dtype=np.float64)
-    norm = math.sqrt(float(q @ q))
+    elements = (value.w, value.x, value.y, value.z)
+    norm = math.hypot(*elements)
     if abs(norm - 1.0) <= QUATERNION_NORM_ERROR:
-        return q / norm
-    check_finite(q.tolist(), name)
+        return np.array(elements, dtype=np.float64) / norm
+    check_finite(elements, name)
     if norm < 1e-6:
         raise Refused('zero_quaternion', f'{name} is all zero: not a rotation')
     raise Refused('bad_quaternion', f'{name} has length {norm:g} instead of 1')

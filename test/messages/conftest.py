@@ -68,7 +68,7 @@ class Build:
             header=self.header('base_link'), fluid_pressure=101325.0, variance=0.0)
 
 
-@pytest.fixture
+@pytest.fixture(scope='session')
 def build():
     return Build()
 

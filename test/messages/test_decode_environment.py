@@ -66,8 +66,8 @@ def test_bad_pressure(build, pressure, reason):
 
 
 def test_sitl_barometer_follows_the_fix(recorded):
-    altitude = [
-        decode_pressure(m, PARAMS).altitude for m in recorded('px4_sitl_v19_position', '/pressure')]
+    messages = recorded('px4_sitl_v19_position', '/pressure')
+    altitude = [decode_pressure(message, PARAMS).altitude for message in messages]
     heights = [m.altitude for m in recorded('px4_sitl_v19_position', '/fix')]
     assert max(altitude) - min(altitude) == pytest.approx(max(heights) - min(heights), abs=2.0)
 
