@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Collection
 from functools import partial
 from typing import TYPE_CHECKING
 from typing import Any
 
+from ekf_fusion_ros.estimator import Estimator
 from ekf_fusion_ros.messages.decode_fix import decode_fix
 from ekf_fusion_ros.messages.decode_fix import decode_fix_velocity
 from ekf_fusion_ros.messages.decode_imu import ImuIntegrator
@@ -14,15 +16,23 @@ from ekf_fusion_ros.messages.decode_imu import decode_imu
 from ekf_fusion_ros.messages.decode_magnetic_field import decode_magnetic_field
 from ekf_fusion_ros.messages.decode_odometry import decode_odometry
 from ekf_fusion_ros.messages.decode_pressure import decode_pressure
-from ekf_fusion_ros.odometry_imu import OdometryImu
-from ekf_fusion_ros.pairing import FixVelocity
 from ekf_fusion_ros.roles import FIX
 from ekf_fusion_ros.roles import FIX_VELOCITY
 from ekf_fusion_ros.roles import IMU
 from ekf_fusion_ros.roles import MAGNETIC_FIELD
 from ekf_fusion_ros.roles import ODOMETRY
 from ekf_fusion_ros.roles import PRESSURE
+from ekf_fusion_ros.samples import AirspeedSample
+from ekf_fusion_ros.samples import AuxVelocitySample
+from ekf_fusion_ros.samples import BaroSample
+from ekf_fusion_ros.samples import FlowSample
+from ekf_fusion_ros.samples import GnssSample
+from ekf_fusion_ros.samples import HeadingSample
 from ekf_fusion_ros.samples import ImuSample
+from ekf_fusion_ros.samples import LandedSample
+from ekf_fusion_ros.samples import MagSample
+from ekf_fusion_ros.samples import RangeSample
+from ekf_fusion_ros.samples import VisionSample
 
 if TYPE_CHECKING:
     from ekf_fusion_ros.params.tree import Params
@@ -30,16 +40,29 @@ if TYPE_CHECKING:
 DECODERS: dict[str, Callable[..., Any]] = {
     ODOMETRY: decode_odometry,
     FIX: decode_fix,
+    FIX_VELOCITY: decode_fix_velocity,
     IMU: decode_imu,
     MAGNETIC_FIELD: decode_magnetic_field,
     PRESSURE: decode_pressure,
 }
 
+ROLE_OF_SAMPLE: dict[type, str] = {
+    ImuSample: IMU,
+    GnssSample: FIX,
+    VisionSample: ODOMETRY,
+    MagSample: MAGNETIC_FIELD,
+    BaroSample: PRESSURE,
+    RangeSample: 'range',
+    FlowSample: 'flow',
+    AirspeedSample: 'airspeed',
+    AuxVelocitySample: 'aux_velocity',
+    LandedSample: 'landed',
+    HeadingSample: 'heading',
+}
+
 
 def decoder_of(role: str, params: Params) -> Callable[[Any], Any]:
     """Return the function that turns a message of `role` into a stamped sample."""
-    if role == FIX_VELOCITY:
-        return lambda message: FixVelocity(*decode_fix_velocity(message, params.messages))
     return partial(DECODERS[role], params=params.messages)
 
 
@@ -48,7 +71,7 @@ class InertialInput:
 
     def __init__(self, params: Params, role: str) -> None:
         self._imu = ImuIntegrator(params.messages) if role == IMU else None
-        self._odometry = OdometryImu(params.two_topic) if role == ODOMETRY else None
+        self._odometry = make_odometry_imu(params) if role == ODOMETRY else None
 
     def push(self, reading: Any) -> list[ImuSample]:
         """Return the increments that end with this reading."""
@@ -56,4 +79,25 @@ class InertialInput:
             sample = self._imu.push(reading)
             return [] if sample is None else [sample]
         assert self._odometry is not None
-        return self._odometry.push(reading)
+        samples: list[ImuSample] = self._odometry.push(reading)
+        return samples
+
+
+def make_estimator(params: Params) -> Estimator:
+    """Return the estimator that the parameters name."""
+    from ekf_fusion_ros.ekf2.ekf2 import Ekf2
+    return Ekf2(params.ekf2)
+
+
+def make_odometry_imu(params: Params) -> Any:
+    """Return what turns odometry into inertial increments."""
+    from ekf_fusion_ros.odometry_imu import OdometryImu
+    return OdometryImu(params.two_topic)
+
+
+def make_motion_heading(params: Params, roles: Collection[str]) -> Any:
+    """Return what finds the heading of the odometry frame from motion, None where not needed."""
+    if not (FIX in roles and ODOMETRY in roles):
+        return None
+    from ekf_fusion_ros.motion_heading import MotionHeading
+    return MotionHeading(params.two_topic)

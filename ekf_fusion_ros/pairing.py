@@ -2,23 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ekf_fusion_ros.messages.decode_fix import FixVelocity
 from ekf_fusion_ros.samples import GnssSample
 from ekf_fusion_ros.statistics import RoleStatistics
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FixVelocity:
-    """Velocity (3,) m/s NED of a receiver and its 1-sigma accuracy in m/s."""
-
-    time_us: int
-    velocity: NDArray[np.float64]
-    accuracy: float
 
 
 class FixPairing:

@@ -7,6 +7,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 from typing import Any
 
+from ekf_fusion_ros.messages.decode_odometry import has_true_heading
+from ekf_fusion_ros.messages.mounting import with_mounting
+
 if TYPE_CHECKING:
     from ekf_fusion_ros.params.tree import Params
 
@@ -41,6 +44,7 @@ def configure(params: Params, roles: Collection[str]) -> Params:
     by the user wins.
     """
     check_roles(roles)
+    params = replace(params, ekf2=with_mounting(params.ekf2, params.messages))
     if not params.session.automatic_aiding:
         return params
     ekf2 = params.ekf2
@@ -65,11 +69,13 @@ def _wanted(params: Params, roles: Collection[str]) -> dict[str, dict[str, Any]]
     if MAGNETIC_FIELD not in roles:
         wanted['mag'] = {'type': 'none'}
     if ODOMETRY in roles:
+        # Its own heading is arbitrary unless it is declared; alone, its frame is the map.
+        own_frame = not has_fix or has_true_heading(params.messages.odometry)
         wanted['vision'] = {
             'use_velocity': True,
             'use_position': not has_fix,
-            'use_yaw': not has_fix,
-            'rotate': has_fix,
+            'use_yaw': own_frame,
+            'rotate': not own_frame,
             'delay_ms': params.session.odometry_delay_ms,
         }
     if IMU not in roles:

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from collections.abc import Collection
 from collections.abc import Mapping
 from collections.abc import Sequence
-from dataclasses import dataclass
 from dataclasses import replace
 import math
 from typing import TYPE_CHECKING
@@ -18,29 +17,24 @@ from ekf_fusion_ros.estimator import GeoPoint
 from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import HealthLevel
 from ekf_fusion_ros.estimator import NavState
+from ekf_fusion_ros.fused_output import FusedOutput
 from ekf_fusion_ros.holding import Holding
+from ekf_fusion_ros.inputs import ROLE_OF_SAMPLE
 from ekf_fusion_ros.inputs import InertialInput
 from ekf_fusion_ros.inputs import decoder_of
+from ekf_fusion_ros.inputs import make_estimator
+from ekf_fusion_ros.inputs import make_motion_heading
 from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.odometry_heading import OdometryHeading
 from ekf_fusion_ros.pairing import FixPairing
 from ekf_fusion_ros.roles import FIX
 from ekf_fusion_ros.roles import FIX_VELOCITY
 from ekf_fusion_ros.roles import IMU
-from ekf_fusion_ros.roles import MAGNETIC_FIELD
 from ekf_fusion_ros.roles import ODOMETRY
-from ekf_fusion_ros.roles import PRESSURE
 from ekf_fusion_ros.roles import configure
-from ekf_fusion_ros.samples import AirspeedSample
-from ekf_fusion_ros.samples import AuxVelocitySample
-from ekf_fusion_ros.samples import BaroSample
-from ekf_fusion_ros.samples import FlowSample
 from ekf_fusion_ros.samples import GnssSample
-from ekf_fusion_ros.samples import HeadingSample
 from ekf_fusion_ros.samples import ImuSample
 from ekf_fusion_ros.samples import LandedSample
-from ekf_fusion_ros.samples import MagSample
-from ekf_fusion_ros.samples import RangeSample
 from ekf_fusion_ros.samples import Sample
 from ekf_fusion_ros.samples import VisionSample
 from ekf_fusion_ros.stamp_order import AidingOrder
@@ -53,36 +47,6 @@ if TYPE_CHECKING:
 
 SECOND_US = 1_000_000
 NO_HEIGHT_EPV = 1e3
-ROLE_OF_SAMPLE: dict[type, str] = {
-    ImuSample: IMU,
-    GnssSample: FIX,
-    VisionSample: ODOMETRY,
-    MagSample: MAGNETIC_FIELD,
-    BaroSample: PRESSURE,
-    RangeSample: 'range',
-    FlowSample: 'flow',
-    AirspeedSample: 'airspeed',
-    AuxVelocitySample: 'aux_velocity',
-    LandedSample: 'landed',
-    HeadingSample: 'heading',
-}
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FusedOutput:
-    """One due output: the state at `nav.time_us` and the fixes taken in since the last one.
-
-    `local` is True where the frame is the odometry's own because no fix takes part.
-    """
-
-    nav: NavState
-    local: bool
-    fixes: tuple[GnssSample, ...] = ()
-
-    @property
-    def time_us(self) -> int:
-        """Stamp of the state in integer microseconds."""
-        return self.nav.time_us
 
 
 class FusionSession:
@@ -113,6 +77,8 @@ class FusionSession:
         self._local = self._is_local()
         self._rate_mhz = round(1000 * self.params.session.output_rate)
         self._last_altitude = 0.0
+        self.restarts = 0
+        self.milestones: dict[str, int] = {}
         self._forget()
 
     def _is_local(self) -> bool:
@@ -304,12 +270,26 @@ class FusionSession:
             return []
         self._tick = tick
         nav = self._estimator.nav_state()
-        if nav is None or not (self._local or (nav.yaw_aligned and nav.origin is not None)):
+        if nav is None:
+            return []
+        self._note_milestones(nav)
+        if not self._local and (nav.origin is None or not nav.yaw_aligned):
             return []
         fixes, self._fixes = tuple(self._fixes), []
         return [FusedOutput(nav, self._local, fixes)]
 
+    def _note_milestones(self, nav: NavState) -> None:
+        """Keep when the filter started, when its yaw was aligned and when the origin was set."""
+        if len(self.milestones) == 3:
+            return
+        self.milestones.setdefault('filter', nav.time_us)
+        if nav.yaw_aligned:
+            self.milestones.setdefault('yaw', nav.time_us)
+        if nav.origin is not None:
+            self.milestones.setdefault('origin', nav.time_us)
+
     def _restart(self) -> None:
+        self.restarts += 1
         self.finish()
         self._collect()
         self._estimator.reset()
@@ -355,6 +335,11 @@ class FusionSession:
         """Return the counts by role; exact at any time but for `pending` ones."""
         return self._statistics
 
+    def resets(self) -> dict[str, int]:
+        """Return how often each part of the state has jumped, and the session restarted."""
+        counts = getattr(self._estimator, 'reset_counts', dict)()
+        return {**counts, 'restarts': self.restarts}
+
     def drain_events(self) -> list[Event]:
         """Return and forget the events since the last call, in order of time."""
         self._collect()
@@ -395,17 +380,3 @@ class FusionSession:
         first = self._statistics[role].refuse(reason, detail)
         if first and detail:
             self._tell(self._now_us or 0, f'{role}: refused, {reason}: {detail}')
-
-
-def make_estimator(params: Params) -> Estimator:
-    """Return the estimator that the parameters name."""
-    from ekf_fusion_ros.ekf2.ekf2 import Ekf2
-    return Ekf2(params.ekf2)
-
-
-def make_motion_heading(params: Params, roles: Collection[str]) -> Any:
-    """Return what finds the heading of the odometry frame from motion, None where not needed."""
-    if not (FIX in roles and ODOMETRY in roles):
-        return None
-    from ekf_fusion_ros.motion_heading import MotionHeading
-    return MotionHeading(params.two_topic)

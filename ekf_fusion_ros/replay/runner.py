@@ -1,0 +1,227 @@
+"""Runs a recording through a session into the sinks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Iterable
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from dataclasses import field
+from dataclasses import replace
+import time
+from typing import Any
+
+from rosbags.typesys import Stores
+from rosbags.typesys import get_typestore
+from tqdm import tqdm
+
+from ekf_fusion_ros.estimator import Event
+from ekf_fusion_ros.fused_output import FusedOutput
+from ekf_fusion_ros.inputs import ROLE_OF_SAMPLE
+from ekf_fusion_ros.messages.stamps import microseconds
+from ekf_fusion_ros.params import Params
+from ekf_fusion_ros.replay.options import ReplayOptions
+from ekf_fusion_ros.replay.sinks import AlignmentSink
+from ekf_fusion_ros.replay.sinks import BagSink
+from ekf_fusion_ros.replay.sinks import StateSink
+from ekf_fusion_ros.replay.sinks import TrajectorySink
+from ekf_fusion_ros.replay.storage import Recording
+from ekf_fusion_ros.replay.storage import RecordingError
+from ekf_fusion_ros.replay.summary import summarise
+from ekf_fusion_ros.replay.topics import ALL_TYPES
+from ekf_fusion_ros.replay.topics import Choice
+from ekf_fusion_ros.replay.topics import choose
+from ekf_fusion_ros.replay.withholding import Withholding
+from ekf_fusion_ros.samples import ImuSample
+from ekf_fusion_ros.samples import LandedSample
+from ekf_fusion_ros.samples import Sample
+from ekf_fusion_ros.session import FusionSession
+
+CSV_SUFFIXES = ('.csv', '.csv.gz')
+BAR_STEP = 200
+Say = Callable[[str], None]
+
+
+@dataclass(slots=True)
+class Progress:
+    """What a run has gone through, for the summary."""
+
+    start_us: int = 0
+    end_us: int = 0
+    first_output_us: int | None = None
+    rows: int = 0
+    events: list[Event] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    cpu_seconds: float = 0.0
+    wall_seconds: float = 0.0
+
+
+def replay(options: ReplayOptions, say: Say = print) -> dict[str, Any]:
+    """Replay a recording, write the files of `options.output`, return the summary.
+
+    `say` gets the choice of topics and what is worth knowing, a line at a time. Raises
+    RecordingError where the recording cannot be used, ValueError for parameters that cannot
+    work together.
+    """
+    if not options.recording.exists():
+        raise RecordingError(f'{options.recording}: does not exist')
+    if options.recording.name.endswith(CSV_SUFFIXES):
+        return _replay_csv(options, say)
+    return _replay_bag(options, say)
+
+
+def _replay_bag(options: ReplayOptions, say: Say) -> dict[str, Any]:
+    with Recording(options.recording, ALL_TYPES) as recording:
+        choice = choose(recording.topics, options.topics, str(options.recording))
+        told = list(recording.notes)
+        for line in [*told, *choice.lines()]:
+            say(line)
+        params = _with_roles(options.params, choice)
+        progress = Progress(recording.start_ns // 1000, recording.end_ns // 1000)
+        run = _Run(replace(options, params=params), list(choice.topics), progress)
+        run.drive(_bag_steps(run, recording, choice))
+        progress.notes = recording.notes
+        for note in recording.notes[len(told):]:
+            say(note)
+        return run.finish(choice, say)
+
+
+def _replay_csv(options: ReplayOptions, say: Say) -> dict[str, Any]:
+    if options.topics:
+        raise RecordingError(f'{options.recording}: a sensor CSV has no topics: leave --topic out')
+    progress = Progress()
+    run = _Run(options, None, progress)
+    run.drive(_csv_steps(run))
+    return run.finish(Choice(), say)
+
+
+def _with_roles(params: Params, choice: Choice) -> Params:
+    """Tell the node's parameters, which name the output frames, what takes part."""
+    return replace(params, node=replace(params.node, use_fix='fix' in choice.topics))
+
+
+class _Run:
+    """One session, its sinks and its clocks."""
+
+    def __init__(
+        self, options: ReplayOptions, roles: list[str] | None, progress: Progress,
+    ) -> None:
+        self.options = options
+        self.progress = progress
+        options.output.mkdir(parents=True, exist_ok=True)
+        self._states = StateSink(options.output) if options.log_states else None
+        self.session = FusionSession(
+            options.params, roles, on_update=self._states.write if self._states else None)
+        self._track = TrajectorySink(options.output)
+        self._alignment = AlignmentSink(options.output)
+        self._bag = BagSink(options.output, options.params, local=self.session.local) \
+            if options.write_bag else None
+        self.withholding = Withholding(options.withhold, progress.start_us)
+
+    def drive(self, steps: Iterable[list[FusedOutput]]) -> None:
+        """Write what each step gives; the sinks are closed whatever happens."""
+        cpu, wall = time.process_time(), time.perf_counter()
+        with ExitStack() as stack:
+            for sink in (self._track, self._alignment, self._bag, self._states):
+                if sink is not None:
+                    stack.callback(sink.close)
+            for outputs in steps:
+                for output in outputs:
+                    self._write(output)
+            self.session.finish()
+            self.progress.events = self.session.drain_events()
+        self.progress.rows = self._track.rows
+        self.progress.cpu_seconds = time.process_time() - cpu
+        self.progress.wall_seconds = time.perf_counter() - wall
+
+    def _write(self, output: FusedOutput) -> None:
+        if self.progress.first_output_us is None:
+            self.progress.first_output_us = output.time_us
+        self._track.write(output)
+        self._alignment.write(output, self.session)
+        if self._bag is not None:
+            self._bag.write(output)
+
+    def finish(self, choice: Choice, say: Say) -> dict[str, Any]:
+        """Write summary.json and say the gist of it."""
+        summary, lines = summarise(self.options, self.session, choice, self.progress)
+        for line in lines:
+            say(line)
+        return summary
+
+
+def _bag_steps(
+    run: _Run, recording: Recording, choice: Choice,
+) -> Iterator[list[FusedOutput]]:
+    """Hand the messages to the session, yielding what is due after each."""
+    session, withholding, options = run.session, run.withholding, run.options
+    store = get_typestore(Stores.ROS2_JAZZY)
+    roles = {topic.name: (role, topic.type) for role, topic in choice.topics.items()}
+    first_ns = recording.start_ns + round(1e9 * options.start)
+    last_ns = None if options.end is None else recording.start_ns + round(1e9 * options.end)
+    total = sum(topic.count for topic in choice.topics.values())
+    for time_ns, name, data in _with_bar(recording.messages(roles), total, options.progress):
+        if time_ns < first_ns:
+            continue
+        if last_ns is not None and time_ns >= last_ns:
+            break
+        role, kind = roles[name]
+        try:
+            message = store.deserialize_cdr(data, kind)
+        except Exception as error:
+            # Damaged bytes can make the decoder raise anything.
+            session.refuse(role, 'undecodable', f'{len(data)} bytes are no {kind} ({error})')
+            continue
+        if role in withholding.roles and withholding.holds(role, _stamp_us(message)):
+            session.refuse(role, 'withheld')
+            continue
+        yield session.handle(role, message)
+
+
+def _csv_steps(run: _Run) -> Iterator[list[FusedOutput]]:
+    """Hand the samples of a sensor CSV to the session, yielding what is due after each."""
+    session, options, progress = run.session, run.options, run.progress
+    for sample in _with_bar(_samples(options), None, options.progress):
+        if not progress.start_us:
+            progress.start_us = sample.time_us
+            run.withholding = Withholding(options.withhold, sample.time_us)
+        progress.end_us = sample.time_us
+        elapsed = (sample.time_us - progress.start_us) * 1e-6
+        if elapsed < options.start:
+            continue
+        if options.end is not None and elapsed >= options.end:
+            break
+        role = ROLE_OF_SAMPLE[type(sample)]
+        if run.withholding.holds(role, sample.time_us):
+            session.refuse(role, 'withheld')
+            continue
+        yield session.push(sample)
+
+
+def _samples(options: ReplayOptions) -> Iterator[Sample]:
+    from ekf_fusion_ros.replay.sensor_csv import read_sensor_csv
+    flags = {name: bool(options.vehicle[name]) for name in ('fixed_wing', 'fuse_beta')
+             if name in options.vehicle}
+    seen = False
+    try:
+        for sample in read_sensor_csv(options.recording):
+            seen = seen or isinstance(sample, ImuSample)
+            yield replace(sample, **flags) if isinstance(sample, LandedSample) else sample
+    except (ValueError, EOFError, OSError) as error:
+        raise RecordingError(f'{options.recording}: {error}') from error
+    if not seen:
+        raise RecordingError(f'{options.recording}: holds no imu rows')
+
+
+def _with_bar(items: Iterable[Any], total: int | None, shown: bool) -> Iterator[Any]:
+    with tqdm(total=total, disable=None if shown else True, unit=' messages', leave=False) as bar:
+        for number, item in enumerate(items, 1):
+            if number % BAR_STEP == 0:
+                bar.update(BAR_STEP)
+            yield item
+
+
+def _stamp_us(message: Any) -> int:
+    stamp = message.header.stamp
+    return microseconds(stamp.sec, stamp.nanosec)

@@ -1,0 +1,162 @@
+"""Where a replay puts its outputs: trajectory, alignment, bag."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+import shutil
+from typing import Any
+from typing import TextIO
+
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer
+from rosbags.typesys import Stores
+from rosbags.typesys import get_typestore
+
+from ekf_fusion_ros.estimator import GeoPoint
+from ekf_fusion_ros.fused_output import FusedOutput
+from ekf_fusion_ros.geo.projection import Projection
+from ekf_fusion_ros.geo.projection import make_projection
+from ekf_fusion_ros.messages.encode import encode_fix
+from ekf_fusion_ros.messages.encode import encode_gnss_odometry
+from ekf_fusion_ros.messages.encode import encode_odometry
+from ekf_fusion_ros.params import Params
+from ekf_fusion_ros.replay.cdr import fix_cdr
+from ekf_fusion_ros.replay.cdr import odometry_cdr
+from ekf_fusion_ros.session import FusionSession
+
+HEADER = 't,x,y,z,qx,qy,qz,qw,vx,vy,vz,yaw,var_x,var_y,var_z,var_yaw'
+ODOMETRY = 'nav_msgs/msg/Odometry'
+NAV_SAT_FIX = 'sensor_msgs/msg/NavSatFix'
+
+
+class TrajectorySink:
+    """trajectory.tum and trajectory.csv: ENU, body FLU, full double precision."""
+
+    def __init__(self, folder: Path) -> None:
+        self._tum: TextIO = (folder / 'trajectory.tum').open('w', encoding='utf-8')
+        self._csv: TextIO = (folder / 'trajectory.csv').open('w', encoding='utf-8')
+        self._csv.write(HEADER + '\n')
+        self.rows = 0
+
+    def write(self, output: FusedOutput) -> None:
+        """Add one row to each file."""
+        nav = output.nav
+        pose, rest = _pose(output), _velocity_and_variances(output)
+        sec, micro = divmod(nav.time_us, 1_000_000)
+        stamp = f'{sec}.{micro:06d}'
+        words = [repr(value) for value in pose]
+        self._tum.write(f'{stamp} {" ".join(words)}\n')
+        self._csv.write(f'{stamp},{",".join(words)},{",".join(map(repr, rest))}\n')
+        self.rows += 1
+
+    def close(self) -> None:
+        """Finish the files."""
+        self._tum.close()
+        self._csv.close()
+
+
+def _pose(output: FusedOutput) -> tuple[float, ...]:
+    """Return x, y, z ENU and qx, qy, qz, qw FLU to ENU (frames.swap_attitude written out)."""
+    north, east, down = output.nav.position.tolist()
+    w, x, y, z = output.nav.quaternion.tolist()
+    half = math.sqrt(0.5)
+    return (east, north, -down,
+            half * (x + y), half * (x - y), half * (w - z), half * (w + z))
+
+
+def _velocity_and_variances(output: FusedOutput) -> tuple[float, ...]:
+    nav = output.nav
+    north, east, down = nav.velocity.tolist()
+    w, x, y, z = nav.quaternion.tolist()
+    heading = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    yaw = math.remainder(0.5 * math.pi - heading, 2.0 * math.pi)
+    var_n, var_e, var_d, _, _, var_yaw = nav.pose_cov.diagonal().tolist()
+    return east, north, -down, yaw, var_e, var_n, var_d, var_yaw
+
+
+class AlignmentSink:
+    """alignment.csv: heading of the odometry frame against ENU, one row a second."""
+
+    def __init__(self, folder: Path) -> None:
+        self._csv: TextIO = (folder / 'alignment.csv').open('w', encoding='utf-8')
+        self._csv.write('t,odom_yaw,sigma\n')
+        self._second = -1
+
+    def write(self, output: FusedOutput, session: FusionSession) -> None:
+        """Add a row when the output begins a new second."""
+        second, micro = divmod(output.time_us, 1_000_000)
+        if second == self._second:
+            return
+        alignment = session.alignment()
+        if alignment is None:
+            return
+        self._second = second
+        self._csv.write(f'{second}.{micro:06d},{alignment[0]!r},{alignment[1]!r}\n')
+
+    def close(self) -> None:
+        """Finish the file."""
+        self._csv.close()
+
+
+class BagSink:
+    """fused/: a rosbag2 with the topics that the node publishes."""
+
+    def __init__(self, folder: Path, params: Params, *, local: bool) -> None:
+        self._frames = params.node.output_frame, params.node.base_link_frame
+        self._projection_name = params.ekf2.earth.projection
+        self._projection: tuple[GeoPoint, Projection] | None = None
+        path = folder / 'fused'
+        if path.exists():
+            shutil.rmtree(path)
+        self._writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
+        self._writer.open()
+        store = get_typestore(Stores.ROS2_JAZZY)
+        topics = {'/odometry/filtered': ODOMETRY}
+        if not local:
+            topics |= {'/odometry/gps': ODOMETRY, '/gps/filtered': NAV_SAT_FIX}
+        self._connections: dict[str, Any] = {
+            topic: self._writer.add_connection(topic, kind, typestore=store)
+            for topic, kind in topics.items()}
+
+    def write(self, output: FusedOutput) -> None:
+        """Add the messages of one output; log time is the stamp."""
+        nav, time_us = output.nav, output.time_us
+        self._put('/odometry/filtered', time_us, odometry_cdr(encode_odometry(nav, *self._frames)))
+        if output.local or nav.origin is None:
+            return
+        projection = self._projection_about(nav.origin)
+        fix = encode_fix(nav, projection, self._frames[1])
+        self._put('/gps/filtered', time_us, fix_cdr(fix))
+        for sample in output.fixes:
+            fields = encode_gnss_odometry(sample, nav.origin, projection, self._frames[0])
+            self._put('/odometry/gps', time_us, odometry_cdr(fields))
+
+    def _put(self, topic: str, time_us: int, data: bytes) -> None:
+        self._writer.write(self._connections[topic], time_us * 1000, data)
+
+    def _projection_about(self, origin: GeoPoint) -> Projection:
+        if self._projection is None or self._projection[0] != origin:
+            made = make_projection(self._projection_name, origin.lat, origin.lon, origin.alt)
+            self._projection = origin, made
+        return self._projection[1]
+
+    def close(self) -> None:
+        """Finish the bag."""
+        self._writer.close()
+
+
+class StateSink:
+    """estimator.csv: one row a filter update, the columns of the parity comparison."""
+
+    def __init__(self, folder: Path) -> None:
+        from ekf_fusion_ros.replay.estimator_log import EstimatorLog
+        self._log = EstimatorLog(folder / 'estimator.csv')
+
+    def write(self, estimator: Any) -> None:
+        """Add a row; called after each filter update."""
+        self._log.write(estimator)
+
+    def close(self) -> None:
+        """Finish the file."""
+        self._log.close()

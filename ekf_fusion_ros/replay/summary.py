@@ -1,0 +1,126 @@
+"""summary.json: what was used, fused, refused and why."""
+
+from __future__ import annotations
+
+from importlib import metadata
+import json
+import math
+import platform
+from typing import TYPE_CHECKING
+from typing import Any
+
+from ekf_fusion_ros.estimator import AidStatus
+from ekf_fusion_ros.replay.options import ReplayOptions
+from ekf_fusion_ros.replay.topics import Choice
+from ekf_fusion_ros.session import FusionSession
+
+if TYPE_CHECKING:
+    from ekf_fusion_ros.replay.runner import Progress
+
+PACKAGES = ('ekf_fusion_ros', 'numpy', 'numba', 'rosbags')
+
+
+def summarise(
+    options: ReplayOptions, session: FusionSession, choice: Choice, progress: Progress,
+) -> tuple[dict[str, Any], list[str]]:
+    """Write summary.json; return its content and its gist in lines."""
+    summary = _content(options, session, choice, progress)
+    text = json.dumps(summary, indent=2, allow_nan=False)
+    (options.output / 'summary.json').write_text(text + '\n', encoding='utf-8')
+    return summary, _gist(summary)
+
+
+def _content(
+    options: ReplayOptions, session: FusionSession, choice: Choice, progress: Progress,
+) -> dict[str, Any]:
+    origin = session.origin
+    duration = (progress.end_us - progress.start_us) * 1e-6
+    return {
+        'recording': str(options.recording),
+        'start': progress.start_us * 1e-6,
+        'duration': duration,
+        'frame': 'local' if session.local else 'map',
+        'origin': None if origin is None else {
+            'lat': origin.lat, 'lon': origin.lon, 'alt': origin.alt},
+        'topics': _topics(session, choice),
+        'aid_sources': {aid.name: _aid(aid) for aid in session.estimator.aid_statuses()},
+        'events': [{'time': event.time_us * 1e-6, 'text': event.text}
+                   for event in progress.events],
+        'resets': dict(session.resets()),
+        'alignment': {name: time_us * 1e-6 for name, time_us in session.milestones.items()},
+        'first_output': _seconds(progress.first_output_us),
+        'rows': progress.rows,
+        'notes': progress.notes,
+        'cpu_seconds': progress.cpu_seconds,
+        'real_time_factor': duration / max(progress.wall_seconds, 1e-9),
+        'versions': _versions(),
+    }
+
+
+def _topics(session: FusionSession, choice: Choice) -> dict[str, Any]:
+    """Return the counts by topic; a sensor CSV has roles for topics."""
+    topics = {}
+    for role, statistics in session.statistics().items():
+        chosen = choice.topics.get(role)
+        name = role if chosen is None else chosen.name
+        about = {'role': role} | ({} if chosen is None else {'type': chosen.type})
+        topics[name] = about | statistics.as_dict()
+    return topics
+
+
+def _aid(aid: AidStatus) -> dict[str, Any]:
+    seen = aid.fused > 0
+    return {
+        'fused': aid.fused,
+        'rejected': aid.rejected,
+        'first': _seconds(aid.first_fused_us if seen else None),
+        'last': _seconds(aid.last_fused_us if seen else None),
+        'starts': aid.starts,
+        'stops': aid.stops,
+    }
+
+
+def _seconds(time_us: int | None) -> float | None:
+    return None if time_us is None else time_us * 1e-6
+
+
+def _versions() -> dict[str, str]:
+    versions = {'python': platform.python_version()}
+    for package in PACKAGES:
+        try:
+            versions[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            continue
+    return versions
+
+
+def _gist(summary: dict[str, Any]) -> list[str]:
+    origin = summary['origin']
+    lines = [] if origin is None else [
+        f'origin: {origin["lat"]:.7f}, {origin["lon"]:.7f}, {origin["alt"]:.2f} m']
+    if summary['first_output'] is None:
+        lines.append('no output: ' + _missing(summary))
+    else:
+        after = summary['first_output'] - summary['start']
+        lines.append(f'{summary["rows"]} rows in frame {summary["frame"]}, the first '
+                     f'{after:.1f} s after the start')
+    for name, topic in summary['topics'].items():
+        reasons = ', '.join(f'{n} {reason}' for reason, n in topic['refused'].items())
+        lines.append(f'{name}: {topic["received"]} received, {topic["accepted"]} accepted'
+                     + (f', refused: {reasons}' if reasons else ''))
+    for name, aid in summary['aid_sources'].items():
+        if aid['fused'] or aid['rejected']:
+            lines.append(f'{name}: {aid["fused"]} fused, {aid["rejected"]} rejected')
+    speed = summary['real_time_factor']
+    if math.isfinite(speed):
+        lines.append(f'{summary["duration"]:.1f} s in {summary["cpu_seconds"]:.1f} s of CPU, '
+                     f'{speed:.0f} times real time')
+    return lines
+
+
+def _missing(summary: dict[str, Any]) -> str:
+    if summary['frame'] == 'local':
+        return 'the filter never started'
+    if summary['origin'] is None:
+        return 'the origin was never set'
+    return 'the yaw was never aligned'

@@ -1,0 +1,119 @@
+"""Which topic of a recording plays which role; what is left out is said."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from dataclasses import field
+
+from ekf_fusion_ros import roles
+from ekf_fusion_ros.replay.storage import RecordingError
+from ekf_fusion_ros.replay.storage import Topic
+
+TYPES: dict[str, tuple[str, ...]] = {
+    roles.ODOMETRY: ('nav_msgs/msg/Odometry',),
+    roles.FIX: ('sensor_msgs/msg/NavSatFix',),
+    roles.FIX_VELOCITY: (
+        'geometry_msgs/msg/TwistWithCovarianceStamped', 'geometry_msgs/msg/TwistStamped'),
+    roles.IMU: ('sensor_msgs/msg/Imu',),
+    roles.MAGNETIC_FIELD: ('sensor_msgs/msg/MagneticField',),
+    roles.PRESSURE: ('sensor_msgs/msg/FluidPressure',),
+}
+ALL_TYPES = frozenset(kind for kinds in TYPES.values() for kind in kinds)
+WITH_ODOMETRY = (roles.ODOMETRY, roles.FIX)
+WITHOUT_ODOMETRY = (
+    roles.IMU, roles.FIX, roles.FIX_VELOCITY, roles.MAGNETIC_FIELD, roles.PRESSURE)
+# A twist may as well be a command or an airspeed.
+VELOCITY_NAMES = ('fix', 'gps', 'gnss', 'navsat')
+# Outputs of a fusion, this one's among them, are not its inputs.
+OUTPUT_NAMES = ('odometry/filtered', 'odometry/gps', 'gps/filtered')
+
+
+@dataclass(slots=True)
+class Choice:
+    """Topic of each role in use, and the sentences that explain the choice."""
+
+    topics: dict[str, Topic] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+
+    def role_of(self, topic: str) -> str:
+        """Return the role that a topic plays."""
+        return next(role for role, chosen in self.topics.items() if chosen.name == topic)
+
+    def lines(self) -> list[str]:
+        """Return the choice in words, one line a topic."""
+        used = [f'{role}: {topic.name} ({topic.type}, {topic.count} messages)'
+                for role, topic in self.topics.items()]
+        return used + self.remarks
+
+
+def choose(available: Mapping[str, Topic], wanted: Mapping[str, str], recording: str) -> Choice:
+    """Return the topics to fuse.
+
+    `wanted` maps a role to the topic asked for, '' to keep the role out. Roles not named there
+    are filled by type. Raises RecordingError where a topic is missing or of the wrong type, or
+    nothing could be fused.
+    """
+    choice = Choice()
+    for role, name in wanted.items():
+        if name:
+            choice.topics[role] = _asked_for(available, role, name, recording)
+    candidates = {role: _candidates(available, role) for role in TYPES}
+    has_odometry = roles.ODOMETRY in choice.topics or (
+        roles.ODOMETRY not in wanted and bool(candidates[roles.ODOMETRY]))
+    for role in WITH_ODOMETRY if has_odometry else WITHOUT_ODOMETRY:
+        if role not in wanted and candidates[role]:
+            choice.topics[role] = candidates[role][0]
+    if roles.FIX not in choice.topics and roles.FIX_VELOCITY not in wanted:
+        choice.topics.pop(roles.FIX_VELOCITY, None)
+    choice.topics = {role: choice.topics[role] for role in TYPES if role in choice.topics}
+    _remark(choice, available, wanted)
+    try:
+        roles.check_roles(choice.topics)
+    except ValueError as error:
+        have = ', '.join(f'{topic.name} ({topic.type})' for topic in available.values())
+        raise RecordingError(f'{recording}: {error}; the recording has {have or "none"}') from None
+    return choice
+
+
+def _asked_for(available: Mapping[str, Topic], role: str, name: str, recording: str) -> Topic:
+    topic = available.get(name) or available.get(f'/{name}')
+    if topic is None:
+        have = ', '.join(one.name for one in available.values() if one.type in TYPES[role])
+        raise RecordingError(
+            f'{recording}: has no topic {name} for role {role}; topics of a suitable type: '
+            f'{have or "none"}')
+    if topic.type not in TYPES[role]:
+        raise RecordingError(
+            f'{recording}: topic {name} is {topic.type}, but role {role} takes '
+            f'{" or ".join(TYPES[role])}')
+    return topic
+
+
+def _candidates(available: Mapping[str, Topic], role: str) -> list[Topic]:
+    """Return the topics that could play a role, the likeliest first, the same every time."""
+    found = [topic for topic in available.values()
+             if topic.type in TYPES[role] and topic.count > 0]
+    if role == roles.FIX_VELOCITY:
+        found = [topic for topic in found
+                 if any(word in topic.name.lower() for word in VELOCITY_NAMES)]
+    found.sort(key=lambda topic: (topic.name.endswith(OUTPUT_NAMES), -topic.count, topic.name))
+    return found
+
+
+def _remark(choice: Choice, available: Mapping[str, Topic], wanted: Mapping[str, str]) -> None:
+    """Say which topics were left out and how each could be added."""
+    used = {topic.name for topic in choice.topics.values()}
+    for topic in available.values():
+        role = next((role for role, kinds in TYPES.items() if topic.type in kinds), None)
+        if role is None or topic.name in used:
+            continue
+        taken = choice.topics.get(role)
+        verb = 'use it instead of ' + taken.name if taken else 'add it'
+        if topic.count == 0:
+            choice.remarks.append(f'left out: {topic.name} ({topic.type}) holds no messages')
+        elif role in wanted and not wanted[role]:
+            choice.remarks.append(f'left out as asked: {topic.name} ({topic.type})')
+        else:
+            choice.remarks.append(f'left out: {topic.name} ({topic.type}); {verb} with '
+                                  f'--topic {role}={topic.name}')

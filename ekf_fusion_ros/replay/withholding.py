@@ -1,0 +1,29 @@
+"""Windows of time in which messages of a role are kept from the filter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from collections.abc import Sequence
+
+from ekf_fusion_ros.roles import FIX
+from ekf_fusion_ros.roles import FIX_VELOCITY
+
+Window = tuple[float, float]
+
+
+class Withholding:
+    """Tells whether a stamp of a role lies in a window [S, E) of seconds from the start."""
+
+    def __init__(self, windows: Mapping[str, Sequence[Window]], start_us: int) -> None:
+        self._windows = {
+            role: [(start_us + round(1e6 * first), start_us + round(1e6 * end))
+                   for first, end in pairs]
+            for role, pairs in windows.items()}
+        if FIX in self._windows:
+            pairs = self._windows.get(FIX_VELOCITY, [])
+            self._windows[FIX_VELOCITY] = pairs + self._windows[FIX]
+        self.roles = frozenset(self._windows)
+
+    def holds(self, role: str, time_us: int) -> bool:
+        """True where a message of this stamp is to be kept back."""
+        return any(first <= time_us < end for first, end in self._windows.get(role, ()))
