@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 TABLE_STEP_DEG = 10.0
 GAUSS_PER_NANOTESLA = 1e-5
+FIRST_YEAR = 2010.0
+LAST_YEAR = 2029.99
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +38,7 @@ class MagneticField(Protocol):
 def make_field(name: str, decimal_year: float) -> MagneticField:
     """Return the model called `name` ('ecl_table' or 'wmm'); the table knows no year.
 
-    Raises ValueError on an unknown name or year, ImportError where pygeomag is missing.
+    Raises ValueError on an unknown name, ImportError where pygeomag is missing.
     """
     if name == 'ecl_table':
         return EclFieldTable.load()
@@ -83,20 +85,20 @@ class WmmField:
     """World Magnetic Model through pygeomag, at sea level and one date."""
 
     def __init__(self, decimal_year: float) -> None:
-        """Set the date; ImportError without pygeomag, ValueError outside its models' years."""
+        """Set the date; ImportError without pygeomag.
+
+        A year outside the models' (2010 to 2030), such as that of a simulation clock, counts as
+        the nearest one inside; `year` is the one in use.
+        """
         try:
             pygeomag: Any = import_module('pygeomag')
         except ImportError as error:
             raise ImportError(
                 "mag.field_model 'wmm' needs the package pygeomag: install it, "
                 "or set mag.field_model to 'ecl_table'") from error
-        if not 2010.0 <= decimal_year < 2030.0:
-            raise ValueError(
-                f'year {decimal_year:.2f}: the World Magnetic Model covers 2010 to 2030; '
-                "set mag.field_model to 'ecl_table'")
-        model_year = int(decimal_year // 5.0) * 5
+        self.year = min(max(decimal_year, FIRST_YEAR), LAST_YEAR)
+        model_year = int(self.year // 5.0) * 5
         self._model = pygeomag.GeoMag(base_year=model_year)
-        self._year = decimal_year
 
     def lookup(self, lat: float, lon: float) -> FieldPoint:
         """Return the field at a latitude and longitude in deg.
@@ -104,7 +106,7 @@ class WmmField:
         Raises ValueError where the place is not on the earth.
         """
         lat, lon = _normalised(lat, lon)
-        result = self._model.calculate(glat=lat, glon=lon, alt=0.0, time=self._year)
+        result = self._model.calculate(glat=lat, glon=lon, alt=0.0, time=self.year)
         return FieldPoint(
             math.radians(result.d), math.radians(result.i), result.f * GAUSS_PER_NANOTESLA)
 
