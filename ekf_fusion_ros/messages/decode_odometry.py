@@ -37,7 +37,8 @@ def decode_odometry(message: Any, params: MessageParams) -> VisionSample:
     """Return an Odometry message as a sample in NED/FRD, velocity in the body frame (FRD).
 
     Not measured are: the whole position when x or y is not, height (NaN z) alone; the
-    orientation when yaw is not; the velocity when the sensor's x axis is not. An orientation
+    orientation when yaw is not; the velocity when the sensor's x axis is not, and when the whole
+    twist is zero with zero covariance, as many visual odometries leave it. An orientation
     whose roll or pitch is not measured keeps its yaw and is level. A body velocity axis that is
     not measured beside a measured x is 0 with `lateral_velocity_noise`. Raises Refused.
     """
@@ -127,7 +128,7 @@ def _velocity(message: Any, params: OdometryMessageParams) -> tuple[Array, Array
     covariance, measured = fields.measured_block(
         flat, 0, VELOCITY_PRIMARY, params.velocity_noise ** 2, params.unmeasured_variance,
         'twist.covariance')
-    if not measured[0]:
+    if not measured[0] or (not any(flat) and _is_blank(twist.twist)):
         return NAN3, params.unmeasured_variance * np.eye(3)
     velocity = fields.vector(twist.twist.linear, 'twist.twist.linear', MAX_VELOCITY, measured)
     for axis in (1, 2):
@@ -135,6 +136,12 @@ def _velocity(message: Any, params: OdometryMessageParams) -> tuple[Array, Array
             covariance[axis, axis] = params.lateral_velocity_noise ** 2
     rotation = sensor_to_body(params.mount_rpy, message.child_frame_id)
     return rotation @ velocity, frames.rotate_covariance(covariance, rotation)
+
+
+def _is_blank(twist: Any) -> bool:
+    """True where neither linear nor angular velocity was ever filled in."""
+    linear, angular = twist.linear, twist.angular
+    return not any((linear.x, linear.y, linear.z, angular.x, angular.y, angular.z))
 
 
 def _levelled(quaternion: Array) -> Array:

@@ -144,6 +144,17 @@ def test_unmeasured_tilt_leaves_the_yaw_level(build):
     assert (yaw, pitch, roll) == pytest.approx((math.pi / 2 - 0.7, 0.0, 0.0), abs=1e-12)
 
 
+def test_a_twist_that_was_never_filled_is_no_velocity_of_zero(build):
+    message = build.odometry(twist_var=(0,) * 6)
+    message.twist.twist.linear = build.vector()
+    assert not decode_odometry(message, PARAMS).has_velocity
+    message.twist.twist.angular.z = 0.1
+    assert decode_odometry(message, PARAMS).velocity.tolist() == [0.0, 0.0, 0.0]
+    message.twist.twist.angular.z = 0.0
+    message.twist.covariance[0] = 0.01
+    assert decode_odometry(message, PARAMS).has_velocity
+
+
 @pytest.mark.parametrize('axis', [0, 1])
 def test_without_a_horizontal_axis_there_is_no_position(build, axis):
     variances = [0.1] * 6
