@@ -10,8 +10,8 @@ from rcl_interfaces.msg import IntegerRange
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 
-from ekf_fusion_ros.params.spec import leaves
 from ekf_fusion_ros.params.spec import ParamSpec
+from ekf_fusion_ros.params.spec import leaves
 from ekf_fusion_ros.params.tree import Params
 from ekf_fusion_ros.params.tree import with_overrides
 

@@ -8,8 +8,8 @@ pytest.importorskip('rclpy')
 
 from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import HealthLevel
-from ekf_fusion_ros.node.diagnostics import estimator_report
 from ekf_fusion_ros.node.diagnostics import TopicWatch
+from ekf_fusion_ros.node.diagnostics import estimator_report
 from ekf_fusion_ros.statistics import RoleStatistics
 
 

@@ -16,8 +16,8 @@ from rclpy.parameter import Parameter
 
 from ekf_fusion_ros.node.parameters import constraints
 from ekf_fusion_ros.node.parameters import declare_parameters
-from ekf_fusion_ros.params.spec import leaves
 from ekf_fusion_ros.params.spec import ParamSpec
+from ekf_fusion_ros.params.spec import leaves
 from ekf_fusion_ros.params.tree import Params
 
 MakeNode = Callable[..., Node]

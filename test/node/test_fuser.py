@@ -1,0 +1,172 @@
+"""The running node: signals, arguments, quality of service, parameters, bad messages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+import signal
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from nav_msgs.msg import Odometry
+from rcl_interfaces.srv import DescribeParameters
+from rclpy.qos import ReliabilityPolicy
+from sensor_msgs.msg import NavSatFix
+
+if TYPE_CHECKING:
+    from fuser_process import Fuser
+    from fuser_process import Peer
+
+StartFuser = Callable[..., 'Fuser']
+TWO_TOPICS = {'odom': Odometry, 'fix': NavSatFix}
+
+
+def odometry(time_s: float) -> Odometry:
+    """Return odometry that drives along x with 1 m/s."""
+    message = Odometry()
+    message.header.frame_id, message.child_frame_id = 'odom', 'base_link'
+    message.header.stamp.sec = 1000 + int(time_s)
+    message.header.stamp.nanosec = round(time_s % 1 * 1e9)
+    message.pose.pose.position.x = time_s
+    message.pose.pose.orientation.w = 1.0
+    message.twist.twist.linear.x = 1.0
+    message.pose.covariance[::7] = 0.01
+    message.twist.covariance[::7] = 0.01
+    return message
+
+
+def fix(time_s: float) -> NavSatFix:
+    """Return a fix with 1 m accuracy that goes east with 1 m/s."""
+    message = NavSatFix(latitude=47.0, longitude=8.0 + time_s / 76056.0, altitude=400.0)
+    message.header.stamp = odometry(time_s).header.stamp
+    message.status.status = 0
+    message.position_covariance[::4] = 1.0
+    message.position_covariance_type = NavSatFix.COVARIANCE_TYPE_DIAGONAL_KNOWN
+    return message
+
+
+@pytest.mark.parametrize(('kind', 'gaps'), [
+    (signal.SIGINT, []), (signal.SIGINT, [0.0]), (signal.SIGINT, [0.001, 0.02]),
+    (signal.SIGTERM, []),
+])
+def test_signals_end_the_node_cleanly(
+    start_fuser: StartFuser, peer: Peer, kind: signal.Signals, gaps: list[float],
+) -> None:
+    fuser = start_fuser()
+    peer.connect(fuser, TWO_TOPICS)
+    fuser.interrupt(kind)
+    for gap in gaps:
+        time.sleep(gap)
+        fuser.interrupt(kind)
+    assert fuser.wait() == 0, fuser.output
+    assert 'Traceback' not in fuser.output
+
+
+@pytest.mark.parametrize(('parameters', 'words'), [
+    ({'ekf2__gnss__delay_ms': -1.0}, 'ekf2.gnss.delay_ms'),
+    ({'ekf2__gnss__no_such_thing': 1.0}, 'unknown parameter ekf2.gnss.no_such_thing'),
+    ({'node__use_odometry': False}, 'inertial input'),
+    ({'node__use_fix': False, 'node__use_fix_velocity': True}, 'fix_velocity needs a fix'),
+])
+def test_unusable_parameters_are_refused(
+    start_fuser: StartFuser, parameters: dict[str, object], words: str,
+) -> None:
+    fuser = start_fuser(**parameters)
+    assert fuser.wait() == 2
+    assert len(fuser.output.splitlines()) == 1
+    assert words in fuser.output
+
+
+def test_topics_have_their_quality_of_service(start_fuser: StartFuser, peer: Peer) -> None:
+    fuser = start_fuser(node__use_imu=True)
+    peer.connect(fuser, TWO_TOPICS)
+    for topic in ('/odometry/filtered', '/odometry/gps', '/gps/filtered'):
+        profiles = [info.qos_profile for info in peer.node.get_publishers_info_by_topic(topic)]
+        assert [profile.reliability for profile in profiles] == [ReliabilityPolicy.RELIABLE]
+    for topic in ('/odom', '/fix', '/imu'):
+        profiles = [
+            info.qos_profile for info in peer.node.get_subscriptions_info_by_topic(topic)]
+        assert [profile.reliability for profile in profiles] == [ReliabilityPolicy.BEST_EFFORT]
+
+
+def test_parameters_are_described_to_other_nodes(start_fuser: StartFuser, peer: Peer) -> None:
+    fuser = start_fuser()
+    client = peer.node.create_client(DescribeParameters, '/fuser/describe_parameters')
+    peer.until(client.service_is_ready, fuser)
+    answer = client.call_async(DescribeParameters.Request(names=['ekf2.gnss.delay_ms']))
+    peer.until(answer.done, fuser)
+    descriptor = answer.result().descriptors[0]
+    assert descriptor.read_only
+    assert 'unit: ms' in descriptor.additional_constraints
+    assert descriptor.floating_point_range[0].to_value > 0
+
+
+def test_silence_is_said(start_fuser: StartFuser, peer: Peer) -> None:
+    fuser = start_fuser()
+    peer.connect(fuser, TWO_TOPICS)
+    assert peer.reports['estimator'].message.startswith('waiting for odometry')
+    assert peer.reports['odometry'].message == 'nothing received on /odom yet'
+    assert peer.reports['fix'].message == 'nothing received on /fix yet'
+
+
+def bad_odometry() -> dict[str, Odometry]:
+    """Return odometry messages that are each wrong in one way, by what is wrong."""
+    made = {name: odometry(10.0 + 0.1 * number) for number, name in enumerate((
+        'nan position', 'infinite velocity', 'zero quaternion', 'negative covariance',
+        'nan covariance', 'zero stamp'))}
+    made['nan position'].pose.pose.position.y = math.nan
+    made['infinite velocity'].twist.twist.linear.x = math.inf
+    made['zero quaternion'].pose.pose.orientation.w = 0.0
+    made['negative covariance'].pose.covariance[0] = -1.0
+    made['nan covariance'].pose.covariance[7] = math.nan
+    made['zero stamp'].header.stamp.sec = made['zero stamp'].header.stamp.nanosec = 0
+    return made
+
+
+def bad_fixes() -> list[NavSatFix]:
+    """Return fixes that are each wrong in one way."""
+    made = [fix(10.0 + 0.1 * number) for number in range(3)]
+    made[0].status.status = -1
+    made[1].latitude = 91.0
+    made[2].longitude = math.nan
+    return made
+
+
+def test_bad_messages_are_counted_and_the_node_lives_on(
+    start_fuser: StartFuser, peer: Peer,
+) -> None:
+    fuser = start_fuser()
+    peer.connect(fuser, TWO_TOPICS)
+    bad, fixes = list(bad_odometry().values()), bad_fixes()
+    stream = [odometry(9.8), odometry(9.9), odometry(9.9), odometry(9.85), *bad, odometry(11.0)]
+    for number, message in enumerate(stream):
+        peer.publish('odom', message)
+        peer.until(lambda n=number: peer.count('odometry') == n + 1, fuser)
+    for number, message in enumerate([*fixes, fix(11.0)]):
+        peer.publish('fix', message)
+        peer.until(lambda n=number: peer.count('fix') == n + 1, fuser)
+    assert peer.count('odometry', 'accepted') == 3
+    assert peer.count('odometry', 'refused') == len(bad) + 2
+    assert peer.count('odometry', 'refused.repeated_stamp') == 1
+    assert peer.count('odometry', 'refused.backward_stamp') == 1
+    assert peer.count('fix', 'refused') == len(fixes)
+    assert peer.count('fix', 'refused.no_fix') == 1
+    assert peer.count('fix', 'accepted') == 1
+
+
+def test_overflow_of_the_queue_is_counted(start_fuser: StartFuser, peer: Peer) -> None:
+    fuser = start_fuser(node__queue_limit=10, node__core_rate=1.0)
+    peer.connect(fuser, TWO_TOPICS)
+    sent = 0
+    while not peer.count('odometry', 'refused.queue_overflow'):
+        for _ in range(5):
+            peer.publish('odom', odometry(0.1 * sent))
+            sent += 1
+        before = peer.reports['odometry']
+        peer.until(lambda seen=before: peer.reports['odometry'] is not seen, fuser)
+    peer.until(lambda: peer.count('odometry') == sent, fuser)
+    assert peer.count('odometry', 'pending') == 0
