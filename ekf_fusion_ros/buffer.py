@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from typing import Generic
 from typing import TypeVar
 
@@ -37,6 +38,11 @@ class SampleBuffer(Generic[T]):
         self._waiting.append((time_us, sample))
         self.newest = sample
         self.newest_time_us = time_us
+
+    def replace(self, change: Callable[[T], T]) -> None:
+        """Change every waiting sample."""
+        for index, (time_us, sample) in enumerate(self._waiting):
+            self._waiting[index] = (time_us, change(sample))
 
     def pop_first_older_than(self, time_us: int) -> tuple[int, T] | None:
         """Take the newest sample with t <= time_us < t + 100 ms, and drop all before it."""

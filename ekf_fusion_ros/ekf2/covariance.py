@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.state import FILTER_PERIOD
 from ekf_fusion_ros.ekf2.state import SIZE
+from ekf_fusion_ros.kernels.magnetic import fuse_field_axis
 from ekf_fusion_ros.kernels.prediction import GRAVITY
 from ekf_fusion_ros.kernels.prediction import fill_transition
 from ekf_fusion_ros.kernels.prediction import predict_covariance
@@ -102,6 +103,15 @@ class Covariance:
             self.p, x, gain, hp, innovation, self.inhibited, self._accel_bias_var_max,
             self.mag_active, self.wind_active))
 
+    def fuse_field_axis(
+        self, x: Array, axis: int, innovation: float, noise: float, all_states: bool,
+        variance: Array,
+    ) -> int:
+        """Correct with one magnetometer axis; see kernels.magnetic.fuse_field_axis."""
+        return int(fuse_field_axis(
+            x, self.p, axis, innovation, noise, all_states, self.inhibited,
+            self._accel_bias_var_max, self.wind_active, variance))
+
     def decorrelate(self, first: int, size: int) -> None:
         """Remove all correlations of states first .. first + size - 1, keeping variances."""
         variances = np.diag(self.p)[first:first + size].copy()
@@ -128,9 +138,9 @@ class Covariance:
         self.p[0:4, 0:4] = jacobian @ np.diag(variances) @ jacobian.T
 
     def add_yaw_variance(self, q: Array, variance: float) -> None:
-        """Add variance (rad^2, at most 0.01) about the earth's vertical."""
+        """Add variance in rad^2 about the earth's vertical."""
         direction = 0.5 * np.array((-q[3], -q[2], q[1], q[0]))
-        self.p[0:4, 0:4] += min(variance, 0.01) * np.outer(direction, direction)
+        self.p[0:4, 0:4] += variance * np.outer(direction, direction)
 
     def activate_mag(self, active: bool) -> None:
         """Switch the field states on or off; their variances survive the pause."""

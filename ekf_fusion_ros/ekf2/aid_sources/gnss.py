@@ -1,0 +1,265 @@
+"""GNSS position and velocity: checked at arrival, started after health, watched, reset, stopped."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ekf_fusion_ros.buffer import SampleBuffer
+from ekf_fusion_ros.ekf2.events import EventKind
+from ekf_fusion_ros.ekf2.filter import Filter
+from ekf_fusion_ros.ekf2.filter import GnssFix
+from ekf_fusion_ros.ekf2.fusion import fuse_horizontal_position
+from ekf_fusion_ros.ekf2.fusion import fuse_horizontal_velocity
+from ekf_fusion_ros.ekf2.fusion import fuse_vertical_velocity
+from ekf_fusion_ros.ekf2.gnss_checks import GnssChecks
+from ekf_fusion_ros.ekf2.resets import Resets
+from ekf_fusion_ros.ekf2.state import FILTER_PERIOD_US
+from ekf_fusion_ros.ekf2.state import SECOND
+from ekf_fusion_ros.ekf2.yaw_recovery import YawRecovery
+from ekf_fusion_ros.estimator import GeoPoint
+from ekf_fusion_ros.samples import GnssSample
+
+Array = NDArray[np.float64]
+
+VERTICAL_NOISE_RATIO = 1.5
+DATA_TIMEOUT_US = 10 * SECOND
+DATA_TIMEOUT_AIDED_US = 1 * SECOND
+INTERMITTENT_US = 1 * SECOND
+
+
+class Gnss:
+    """Observes fixes behind the horizon; starts, continues, resets or stops their fusion."""
+
+    def __init__(self, f: Filter, resets: Resets, checks: GnssChecks, recovery: YawRecovery,
+                 capacity: int) -> None:
+        """Act on a filter through its resets and the yaw recovery."""
+        self._f = f
+        self._resets = resets
+        self._checks = checks
+        self._recovery = recovery
+        self.buffer: SampleBuffer[GnssFix] = SampleBuffer(capacity)
+        self.last_arrival_us = 0
+        self.intermittent = True
+        self.vision_yaw_forbidden = False
+        self._previous_fix_us = 0
+
+    @property
+    def wanted(self) -> bool:
+        """True where the parameters ask for fixes at all."""
+        params = self._f.params
+        return params.gnss.enabled or params.height.reference == 'gnss'
+
+    def push(self, sample: GnssSample, min_interval_us: int, initialised: bool) -> bool:
+        """Check a fix at arrival and queue it; True when it set the origin."""
+        f = self._f
+        spaced = sample.time_us - self.last_arrival_us > min_interval_us
+        if not spaced or not self.wanted or sample.fix_type < 3:
+            return False
+        self.last_arrival_us = sample.time_us
+        self._checks.run(sample)
+        origin_set = initialised and not f.earth.has_origin and self._checks.healthy
+        if origin_set:
+            self._set_origin(sample)
+        elif f.earth.field is None and sample.eph < 1000.0:
+            f.earth.look_around(sample.lat, sample.lon, sample.time_us)
+            f.yaw_reset_requested |= f.params.mag.type != 'none'
+        delay_us = round(f.params.gnss.delay_ms * 1000) + FILTER_PERIOD_US // 2
+        self.buffer.push(sample.time_us - delay_us, self._to_local(sample))
+        return origin_set
+
+    def _to_local(self, sample: GnssSample) -> GnssFix:
+        f = self._f
+        position = np.zeros(2)
+        if f.earth.projection is not None:
+            position[:] = f.earth.projection.project(sample.lat, sample.lon)
+        delay_us = round(f.params.gnss.delay_ms * 1000) + FILTER_PERIOD_US // 2
+        return GnssFix(sample.time_us - delay_us, position, sample.alt, sample.velocity,
+                       sample.eph, sample.epv, sample.sacc, sample.has_velocity)
+
+    def _set_origin(self, sample: GnssSample) -> None:
+        """Tie the local frame to the earth so that a position that is already in use stays valid."""
+        f = self._f
+        altitude = sample.alt
+        if f.flags.aided_horizontally():
+            f.earth.set_origin_from(sample.lat, sample.lon, altitude, f.position)
+        else:
+            f.earth.set_origin(sample.lat, sample.lon, altitude + float(f.x[9]))
+        known_before = f.earth.field is not None
+        f.earth.look_around(sample.lat, sample.lon, sample.time_us)
+        if f.params.mag.type == 'none':
+            self._recovery.request()
+        elif not known_before:
+            f.yaw_reset_requested = True
+        f.events.add(f.t_now, EventKind.ORIGIN_SET,
+                     f'{f.earth.origin_lat:.7f}, {f.earth.origin_lon:.7f}')
+
+    def move_origin(self, origin: GeoPoint) -> bool:
+        """Move the origin; position, waiting fixes and offsets keep their place on the earth."""
+        f = self._f
+        if not abs(origin.lat) <= 90.0 or not abs(origin.lon) <= 180.0:
+            return False
+        before = f.earth.projection
+        altitude_before = f.earth.alt_ref
+        place = None if before is None else before.reproject(float(f.x[7]), float(f.x[8]))
+        f.earth.set_origin(origin.lat, origin.lon, origin.alt)
+        f.earth.look_around(origin.lat, origin.lon, f.t_now)
+        if before is None or place is None or f.earth.projection is None:
+            return True
+        position = np.array(f.earth.projection.project(*place))
+        shift = position - f.x[7:9]
+        self.buffer.replace(lambda fix: fix._replace(position=fix.position + shift))
+        self._resets.move_horizontally(shift)
+        self._resets.move_vertically(origin.alt - altitude_before)
+        return True
+
+    def pop(self) -> bool:
+        """Take the fix at the horizon; True when there was one."""
+        popped = self.buffer.pop_first_older_than(self._f.t_horizon)
+        if popped is None:
+            return False
+        if self._f.fix is not None:
+            self._previous_fix_us = self._f.fix.time_us
+        self._f.fix = popped[1]
+        return True
+
+    def step(self, popped: bool) -> None:
+        """Run once per filter period."""
+        f = self._f
+        if not popped:
+            self._watch_silence()
+            return
+        self._start_or_stop()
+        if not f.flags.gps:
+            self._recovery.align_without_gnss(self._checks.healthy)
+        else:
+            self._recover_or_reset()
+        if f.flags.gps:
+            self._remove_lever_arm()
+            self._fuse()
+
+    def _watch_silence(self) -> None:
+        f = self._f
+        if not f.flags.gps or f.fix is None:
+            return
+        silence = f.t_horizon - f.fix.time_us
+        if silence > DATA_TIMEOUT_US:
+            self.stop(EventKind.GPS_DATA_STOPPED)
+        elif silence > DATA_TIMEOUT_AIDED_US and f.flags.aided_other_than(f.flags.gps):
+            self.stop(EventKind.GPS_DATA_STOPPED_ALTERNATE)
+
+    def _start_or_stop(self) -> None:
+        f = self._f
+        flags = f.flags
+        ready = flags.tilt_align and f.earth.has_origin and self._checks.passing
+        if f.params.gnss.enabled and not flags.gps and ready:
+            if self._yaw_refers_to_north():
+                self._start()
+        elif flags.gps and (not f.params.gnss.enabled or not flags.yaw_align):
+            self.stop(None)
+        if flags.gps and self._checks.failing and flags.aided_other_than(flags.gps):
+            self.stop(EventKind.GPS_QUALITY_POOR)
+            if flags.ev_pos and not f.params.vision.rotate:
+                self._resets.position_to_aiding()
+
+    def _yaw_refers_to_north(self) -> bool:
+        """True where yaw can be used with GNSS; otherwise ask for one that can."""
+        f = self._f
+        flags = f.flags
+        has_compass = f.params.mag.type != 'none'
+        if flags.yaw_align and not flags.ev_yaw and not (has_compass and f.yaw_reset_requested):
+            return True
+        if flags.ev_yaw:
+            # yaw of the odometry frame: its heading against north is not known
+            flags.ev_yaw = False
+            self.vision_yaw_forbidden = True
+            if not has_compass:
+                flags.yaw_align = False
+                self._recovery.request()
+        f.yaw_reset_requested |= has_compass
+        return False
+
+    def _start(self) -> None:
+        f = self._f
+        assert f.fix is not None
+        f.events.add(f.t_now, EventKind.GPS_STARTED)
+        self._resets.position_to_fix()
+        if not f.flags.opt_flow and f.fix.has_velocity:
+            self._resets.velocity_to_fix()
+        f.flags.gps = True
+        f.times.hor_pos = f.times.hor_vel = f.t_now
+
+    def stop(self, reason: EventKind | None) -> None:
+        """Stop fusing position, velocity and height."""
+        f = self._f
+        if reason is not None:
+            f.events.add(f.t_now, reason)
+        f.flags.gps = False
+        f.flags.gps_hgt = False
+        f.flags.gps_yaw = False
+        self.vision_yaw_forbidden = False
+        seen = f.observations
+        for record in (seen.gps_hor_vel, seen.gps_ver_vel, seen.gps_hor_pos, seen.gps_height):
+            record.clear(f.t_now)
+
+    def _aiding_timed_out(self) -> bool:
+        f = self._f
+        times = f.times
+        limit = round(f.params.aiding.reset_timeout * SECOND)
+        newest = max(times.hor_pos, times.del_pos, times.hor_vel, times.flow)
+        return f.late(newest, limit) or f.late(times.hor_pos, 2 * limit)
+
+    def _recover_or_reset(self) -> None:
+        """Yaw from the EKF-GSF bank after a bad take-off, or position and velocity from the fix."""
+        f = self._f
+        timed_out = self._aiding_timed_out()
+        if self._recovery.step(timed_out, self._previous_fix_us, self._checks.healthy):
+            return
+        if timed_out:
+            f.events.add(f.t_now, EventKind.GPS_FUSION_TIMEOUT)
+            self._resets.velocity_to_aiding(self._checks.healthy)
+            self._resets.position_to_aiding()
+            f.times.hor_pos = f.times.hor_vel = f.t_now
+
+    def _remove_lever_arm(self) -> None:
+        """Move the fix from the antenna to the IMU."""
+        f = self._f
+        assert f.fix is not None
+        lever = np.subtract(f.params.gnss.position, f.params.imu.position)
+        sacc = max(f.fix.sacc, f.params.gnss.vel_noise)
+        if not lever.any():
+            f.fix = f.fix._replace(sacc=sacc)
+            return
+        arm = f.rot @ lever
+        f.fix = f.fix._replace(
+            position=f.fix.position - arm[0:2], altitude=f.fix.altitude + float(arm[2]),
+            velocity=f.fix.velocity - f.rot @ np.cross(f.rate, lever), sacc=sacc)
+
+    def _fuse(self) -> None:
+        f = self._f
+        fix, params = f.fix, f.params.gnss
+        assert fix is not None
+        velocity_innovation = (f.x[4:7] - fix.velocity).tolist()
+        position_innovation = (f.x[7:9] - fix.position).tolist()
+        if fix.has_velocity:
+            noise = fix.sacc ** 2
+            f.last_velocity = fix.velocity[0:2]
+            f.last_velocity_variance = np.full(2, noise)
+            fuse_horizontal_velocity(f, f.observations.gps_hor_vel, velocity_innovation[0:2],
+                                     (noise, noise), params.vel_gate)
+            fuse_vertical_velocity(f, f.observations.gps_ver_vel, velocity_innovation[2],
+                                   noise * VERTICAL_NOISE_RATIO ** 2, params.vel_gate)
+        noise = self._position_sigma(fix.hacc) ** 2
+        fuse_horizontal_position(f, f.observations.gps_hor_pos, position_innovation,
+                                 (noise, noise), params.pos_gate,
+                                 relative=f.position_is_relative)
+
+    def _position_sigma(self, hacc: float) -> float:
+        """Bound the claimed accuracy; a sole source may not be distrusted without limit."""
+        f = self._f
+        lower = max(f.params.gnss.pos_noise, 0.01)
+        sigma = max(hacc, lower)
+        if f.flags.aided_other_than(f.flags.gps):
+            return sigma
+        return min(sigma, max(f.params.aiding.pos_noaid_noise, lower))
+

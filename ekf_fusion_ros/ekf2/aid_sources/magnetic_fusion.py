@@ -1,0 +1,157 @@
+"""Fusion of the three magnetometer axes and of the declination."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ekf_fusion_ros.ekf2.filter import Filter
+from ekf_fusion_ros.ekf2.state import BODY_FIELD
+from ekf_fusion_ros.ekf2.state import EARTH_FIELD
+from ekf_fusion_ros.kernels.magnetic import predict_field
+
+Array = NDArray[np.float64]
+
+DECLINATION_SPREAD = 0.5
+MIN_FIELD = 1e-3
+
+
+def table_declination(f: Filter) -> float:
+    """Return the declination in rad from the field model where known, else the parameter."""
+    if f.params.mag.declination_from_table and f.earth.field is not None:
+        return f.earth.field.declination
+    return math.radians(f.params.mag.declination_deg)
+
+
+def declination(f: Filter) -> float:
+    """Return the declination in rad the filter works with."""
+    if f.flags.mag_aligned_in_flight:
+        return math.atan2(f.x[17], f.x[16])
+    return table_declination(f)
+
+
+def fuse_three_axes(f: Filter, measured: Array, all_states: bool) -> bool:
+    """Gate the three axes together and fuse them one by one; False where nothing was fused."""
+    params = f.params.mag
+    noise = max(params.noise, 1e-3) ** 2
+    innovation, variance = np.empty(3), np.empty(3)
+    predict_field(f.x, f.cov.p, measured, noise, innovation, variance)
+    for axis, name in enumerate(('mag_x', 'mag_y', 'mag_z')):
+        if variance[axis] < noise:
+            setattr(f.faults, name, True)
+            _restart_field_covariance(f)
+            return False
+        setattr(f.faults, name, False)
+    if f.flags.synthetic_mag_z:
+        innovation[2] = 0.0
+    ratios = innovation ** 2 / (max(params.gate, 1.0) ** 2 * variance)
+    record = f.observations.mag
+    record.record(f.t_now, innovation.tolist(), variance.tolist(), float(ratios.max()))
+    f.observations.yaw.test_ratio = 0.0
+    rejections = f.rejections
+    rejections.mag_x, rejections.mag_y, rejections.mag_z = (ratios > 1.0).tolist()
+    rejections.mag_judged_after_height = True
+    if record.test_ratio > 1.0:
+        record.reject()
+        return False
+    record.accept()
+    last = 2 if f.flags.synthetic_mag_z else 3
+    for axis in range(last):
+        if not _fuse_axis(f, axis, float(innovation[axis]), noise, all_states, variance):
+            break
+    record.variance[:] = variance.tolist()
+    return True
+
+
+def _fuse_axis(
+    f: Filter, axis: int, innovation: float, noise: float, all_states: bool, variance: Array,
+) -> bool:
+    name = ('mag_x', 'mag_y', 'mag_z')[axis]
+    outcome = f.cov.fuse_field_axis(f.x, axis, innovation, noise, all_states, variance)
+    setattr(f.faults, name, outcome != 0)
+    if outcome == 1:
+        _restart_field_covariance(f)
+        return False
+    if outcome == 0:
+        limit_declination(f)
+    return True
+
+
+def _restart_field_covariance(f: Filter) -> None:
+    tilt = f.params.imu.initial_tilt_err ** 2
+    f.cov.set_attitude(f.x[0:4], np.full(3, tilt))
+    f.cov.reset_field(f.params.mag.noise ** 2)
+
+
+def fuse_declination(f: Filter, sigma: float) -> None:
+    """Fuse atan2(east, north) of the earth field with a sigma in rad."""
+    north, east = f.x[16], f.x[17]
+    if abs(north) < MIN_FIELD * 1e-3:
+        return
+    noise = sigma * sigma
+    square = north * north + east * east
+    h = np.zeros(24)
+    h[16], h[17] = -east / square, north / square
+    gain = f.cov.p @ h
+    variance = float(gain @ h) + noise
+    if variance <= noise:
+        f.faults.declination = True
+        return
+    innovation = math.atan2(east, north) - declination(f)
+    innovation = min(max(innovation, -DECLINATION_SPREAD), DECLINATION_SPREAD)
+    hp = h @ f.cov.p
+    gain /= variance
+    gain[13:16][f.cov.inhibited != 0.0] = 0.0
+    f.observations.declination.record(f.t_now, (innovation,), (variance,), 0.0)
+    f.observations.declination.accept()
+    f.faults.declination = not f.cov.fuse(f.x, gain, hp, innovation)
+    limit_declination(f)
+
+
+def limit_declination(f: Filter) -> None:
+    """Keep the horizontal earth field long enough and within 0.5 rad of the reference."""
+    reference = table_declination(f)
+    field = f.earth.field
+    shortest = MIN_FIELD
+    if field is not None:
+        shortest = max(MIN_FIELD, 0.5 * field.strength * math.cos(field.inclination))
+    north, east = float(f.x[16]), float(f.x[17])
+    length = math.hypot(north, east)
+    if length < shortest:
+        if length > MIN_FIELD * shortest:
+            north, east = north * shortest / length, east * shortest / length
+            f.x[16], f.x[17] = north, east
+        else:
+            f.x[16] = 2.0 * shortest * math.cos(reference)
+            f.x[17] = 2.0 * shortest * math.sin(reference)
+            return
+    angle = math.atan2(east, north)
+    wanted = min(max(angle, reference - DECLINATION_SPREAD), reference + DECLINATION_SPREAD)
+    if wanted != angle:
+        length = math.hypot(north, east)
+        f.x[16], f.x[17] = length * math.cos(wanted), length * math.sin(wanted)
+
+
+def synthetic_z(f: Filter, measured: Array) -> float | None:
+    """Return the z axis that field model and attitude imply, Gauss; None where unknown."""
+    field = f.earth.field
+    if field is None or not f.params.mag.declination_from_table:
+        return None
+    horizontal = field.strength * math.cos(field.inclination)
+    earth = np.array((horizontal * math.cos(field.declination),
+                      horizontal * math.sin(field.declination),
+                      field.strength * math.sin(field.inclination)))
+    rest = field.strength ** 2 - measured[0] ** 2 - measured[1] ** 2
+    return math.copysign(math.sqrt(max(rest, 0.0)), float(earth @ f.rot[:, 2]))
+
+
+def start_field_from(f: Filter, measured: Array) -> None:
+    """Set the earth field to a measurement (3,) in body axes at the cached attitude."""
+    f.x[EARTH_FIELD] = f.rot @ measured
+
+
+def zero_body_field(f: Filter) -> None:
+    """Forget the body field."""
+    f.x[BODY_FIELD] = 0.0

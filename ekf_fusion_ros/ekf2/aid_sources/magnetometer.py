@@ -1,0 +1,242 @@
+"""Magnetometer: heading on the ground and in steady flight, all three axes when observable."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ekf_fusion_ros.buffer import SampleBuffer
+from ekf_fusion_ros.ekf2.aid_sources.magnetic_fusion import declination
+from ekf_fusion_ros.ekf2.aid_sources.magnetic_fusion import fuse_declination
+from ekf_fusion_ros.ekf2.aid_sources.magnetic_fusion import fuse_three_axes
+from ekf_fusion_ros.ekf2.aid_sources.magnetic_fusion import start_field_from
+from ekf_fusion_ros.ekf2.aid_sources.magnetic_fusion import synthetic_z
+from ekf_fusion_ros.ekf2.averaging import SampleAverage
+from ekf_fusion_ros.ekf2.filter import Filter
+from ekf_fusion_ros.ekf2.heading import PSEUDO_YAW_NOISE
+from ekf_fusion_ros.ekf2.heading import HeadingFusion
+from ekf_fusion_ros.ekf2.heading import mag_yaw
+from ekf_fusion_ros.ekf2.resets import Resets
+from ekf_fusion_ros.ekf2.state import FILTER_PERIOD
+from ekf_fusion_ros.ekf2.state import SECOND
+from ekf_fusion_ros.ekf2.terrain import Terrain
+from ekf_fusion_ros.samples import MagSample
+
+Array = NDArray[np.float64]
+
+ANOMALY_HEIGHT = 1.5
+"""Height in m above ground below which steel in the ground may bend the field."""
+
+OBSERVABLE_MEMORY_US = 2 * SECOND
+FIELD_SETTLING_US = 5 * SECOND
+INHIBITED_TOO_LONG_US = 5 * SECOND
+STRENGTH_TOLERANCE = 0.2
+
+
+class Magnetometer:
+    """Observes, selects heading or 3-axis fusion, realigns yaw above the ground, fuses."""
+
+    def __init__(self, f: Filter, resets: Resets, heading: HeadingFusion, terrain: Terrain,
+                 capacity: int) -> None:
+        """Act on a filter through its resets and heading fusion."""
+        self._f = f
+        self._resets = resets
+        self._heading = heading
+        self._terrain = terrain
+        self.average = SampleAverage(3)
+        self.buffer: SampleBuffer[Array] = SampleBuffer(capacity)
+        self.lpf = np.zeros(3)
+        self.count = 0
+        self.field = np.zeros(3)
+        self.aligned_us = 0
+        self.inhibit_reset_request = False
+        self._declination_done = False
+        self._yaw_observable = False
+        self._bias_observable = False
+        self._yaw_started_us = 0
+        self._suitable_us = 0
+        self._not_inhibited_us = 0
+        self._inhibited = False
+        self._other_yaw_before = False
+
+    @property
+    def usable(self) -> bool:
+        """True where the parameters allow the magnetometer to set the heading at start."""
+        return self._f.params.mag.type in ('auto', 'heading', 'three_axis')
+
+    def push(self, sample: MagSample, min_interval_us: int) -> None:
+        """Average a raw sample in, and queue the mean when the interval has passed."""
+        delay_us = round(self._f.params.mag.delay_ms * 1000)
+        mean = self.average.add(sample.time_us, sample.field, min_interval_us, delay_us)
+        if mean is not None:
+            self.buffer.push(*mean)
+
+    def pop(self) -> bool:
+        """Take the sample at the horizon into `field` and its low-pass; True when there was one."""
+        popped = self.buffer.pop_first_older_than(self._f.t_horizon)
+        if popped is None:
+            return False
+        measured = popped[1]
+        self.lpf = 0.9 * self.lpf + 0.1 * measured if self.count else measured.copy()
+        self.count += 1
+        self.field = measured
+        if self._f.params.mag.synthesize_z:
+            self._replace_z(measured)
+        return True
+
+    def _replace_z(self, measured: Array) -> None:
+        z = synthetic_z(self._f, measured)
+        self._f.flags.synthetic_mag_z = z is not None
+        if z is not None:
+            self.field = np.array((measured[0], measured[1], z))
+
+    def step(self, popped: bool) -> None:
+        """Run once per filter period; popped: a new sample is in `field`."""
+        f = self._f
+        flags = f.flags
+        if f.params.mag.check_strength:
+            flags.mag_disturbed = self._strength_implausible()
+        if not flags.in_air:
+            flags.mag_aligned_in_flight = False
+        no_other_yaw = not flags.ev_yaw and not flags.gps_yaw
+        if f.params.mag.type == 'none' or flags.mag_fault or not flags.tilt_align:
+            self.stop()
+            if no_other_yaw:
+                self._heading.hold(None, PSEUDO_YAW_NOISE)
+            return
+        other_yaw_ended = no_other_yaw and self._other_yaw_before
+        self._other_yaw_before = not no_other_yaw
+        if other_yaw_ended or not flags.yaw_align or self.inhibit_reset_request:
+            f.yaw_reset_requested = True
+        if not no_other_yaw or not popped:
+            return
+        self._select()
+        self._realign_yaw_if_requested()
+        if flags.yaw_align:
+            self._fuse()
+
+    def _strength_implausible(self) -> bool:
+        strength = float(np.linalg.norm(self.field))
+        field = self._f.earth.field
+        if self._f.earth.has_origin and field is not None:
+            return abs(strength - field.strength) > STRENGTH_TOLERANCE
+        return abs(strength - 0.45) > 0.40
+
+    def stop(self) -> None:
+        """Stop heading and 3-axis fusion."""
+        self._use_three_axes(False)
+        self._f.flags.mag_hdg = False
+        self._declination_done = False
+
+    def _use_three_axes(self, use: bool) -> None:
+        if use:
+            self._f.flags.mag_hdg = False
+        if self._f.flags.mag_3d != use:
+            self._f.flags.mag_3d = use
+            self._f.cov.activate_mag(use)
+
+    def _select(self) -> None:
+        kind = self._f.params.mag.type
+        three_axes = kind == 'three_axis'
+        if kind in ('auto', 'vtol'):
+            three_axes = self._field_is_observable()
+        self._use_three_axes(three_axes)
+        self._f.flags.mag_hdg = not three_axes
+
+    def _field_is_observable(self) -> bool:
+        """Judge yaw and body-field observability; call once per sample."""
+        f = self._f
+        gate = f.params.mag.acceleration_gate
+        needed = gate if self._yaw_observable else 2.0 * gate
+        acceleration = math.hypot(f.accel_lpf[0], f.accel_lpf[1])
+        self._yaw_observable = acceleration > needed and (f.flags.gps or f.flags.ev_pos)
+        rate_gate = f.params.mag.yaw_rate_gate
+        if not self._bias_observable:
+            self._bias_observable = abs(f.output.yaw[1]) > rate_gate
+        else:
+            elapsed = 1e-6 * (f.t_horizon - self._yaw_started_us)
+            self._bias_observable = abs(f.output.yaw[0]) > 0.5 * rate_gate * elapsed
+        f.output.yaw[0] = 0.0
+        self._yaw_started_us = f.t_horizon
+        if self._yaw_observable or self._bias_observable:
+            self._suitable_us = f.t_horizon
+        recently_observable = f.t_horizon - self._suitable_us < OBSERVABLE_MEMORY_US
+        return f.flags.mag_aligned_in_flight and recently_observable
+
+    def _realign_yaw_if_requested(self) -> None:
+        f = self._f
+        if f.flags.in_air and not f.flags.mag_aligned_in_flight:
+            clear_of_ground = self._terrain.ground_down() - f.x[9] > ANOMALY_HEIGHT
+            f.yaw_reset_requested |= bool(clear_of_ground)
+        may_reset = not f.flags.mag_disturbed and f.params.mag.type != 'none'
+        if not f.yaw_reset_requested or self._inhibited or not may_reset:
+            return
+        if not self.reset_heading():
+            return
+        f.yaw_reset_requested = False
+        f.flags.yaw_align = True
+        if f.flags.in_air:
+            f.flags.mag_aligned_in_flight = True
+        if self.inhibit_reset_request:
+            self.inhibit_reset_request = False
+            bias_variance = (f.params.imu.switch_on_gyro_bias * FILTER_PERIOD) ** 2
+            f.cov.set_variances(12, np.array((bias_variance,)))
+
+    def reset_heading(self, *, initial: bool = False) -> bool:
+        """Set yaw and earth field from the filtered field; True when done or not needed."""
+        f = self._f
+        if self.aligned_us == f.t_horizon and not initial:
+            return True
+        if f.params.mag.type == 'indoor':
+            return True
+        if f.params.mag.type == 'none':
+            return False
+        yaw = mag_yaw(f, self.lpf, declination(f))
+        variance = 0.0 if initial else max(f.params.mag.heading_noise, 1e-2) ** 2
+        self._resets.yaw(yaw, variance, shift_output=not initial)
+        start_field_from(f, self.lpf)
+        f.cov.reset_field(f.params.mag.noise ** 2)
+        self._declination_done = False
+        self.aligned_us = f.t_horizon
+        return True
+
+    def _fuse(self) -> None:
+        f = self._f
+        flags = f.flags
+        flags.mag_dec = flags.mag_3d and (not flags.gps or f.params.mag.declination_always)
+        earth_aided = flags.gps or flags.ev_pos or flags.ev_vel
+        indoors = f.params.mag.type == 'indoor' and not earth_aided
+        self._inhibited = indoors or flags.mag_disturbed
+        if not self._inhibited:
+            self._not_inhibited_us = f.t_horizon
+        if f.t_horizon - self._not_inhibited_us > INHIBITED_TOO_LONG_US:
+            self.inhibit_reset_request = True
+        if flags.mag_3d:
+            self._fuse_three_axes()
+        elif flags.mag_hdg:
+            self._fuse_heading()
+
+    def _fuse_three_axes(self) -> None:
+        f = self._f
+        all_states = f.t_horizon - self.aligned_us > FIELD_SETTLING_US
+        if not self._declination_done:
+            # the field direction is taken from the model first, so that yaw does not move
+            fuse_declination(f, 0.02)
+            self._declination_done = True
+            fuse_three_axes(f, self.field, all_states)
+            return
+        fuse_three_axes(f, self.field, all_states)
+        if f.flags.mag_dec:
+            fuse_declination(f, 0.5)
+
+    def _fuse_heading(self) -> None:
+        f = self._f
+        noise = f.params.mag.heading_noise ** 2
+        self._heading.predicted_yaw()
+        yaw = mag_yaw(f, self.field - f.x[19:22], declination(f))
+        if self._inhibited:
+            self._heading.hold(yaw, noise)
+        else:
+            self._heading.fuse_measured(yaw, noise)

@@ -1,0 +1,42 @@
+"""Averaging of fast scalar and vector sensors down to the rate of their buffer."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ekf_fusion_ros.ekf2.state import FILTER_PERIOD_US
+
+Array = NDArray[np.float64]
+
+
+class SampleAverage:
+    """Mean of all samples since the last one that was handed on."""
+
+    def __init__(self, size: int) -> None:
+        """Average vectors of a size."""
+        self._sum = np.zeros(size)
+        self._milliseconds = 0
+        self._count = 0
+        self._accepted_us = 0
+
+    def add(
+        self, time_us: int, value: Array, min_interval_us: int, delay_us: int,
+    ) -> tuple[int, Array] | None:
+        """Add a sample; return time at the sensor and mean once the interval has passed.
+
+        Stamps are averaged in whole milliseconds; half a filter period is taken off because the
+        sample belongs to the middle of the period that the horizon crosses.
+        """
+        self._sum += value
+        self._milliseconds += time_us // 1000
+        self._count += 1
+        if time_us - self._accepted_us <= min_interval_us:
+            return None
+        mean = self._sum / self._count
+        stamp = 1000 * (self._milliseconds // self._count)
+        self._sum[:] = 0.0
+        self._milliseconds = 0
+        self._count = 0
+        self._accepted_us = time_us
+        return stamp - delay_us - FILTER_PERIOD_US // 2, mean

@@ -1,0 +1,121 @@
+"""One filter period at the horizon: which samples have come, and every aid source in turn."""
+
+from __future__ import annotations
+
+import math
+
+from ekf_fusion_ros.ekf2.aid_sources.barometer import Barometer
+from ekf_fusion_ros.ekf2.aid_sources.fake_position import FakePosition
+from ekf_fusion_ros.ekf2.aid_sources.gnss import INTERMITTENT_US
+from ekf_fusion_ros.ekf2.aid_sources.gnss import Gnss
+from ekf_fusion_ros.ekf2.aid_sources.magnetometer import Magnetometer
+from ekf_fusion_ros.ekf2.aid_sources.vision import Vision
+from ekf_fusion_ros.ekf2.alignment import initialise_covariance
+from ekf_fusion_ros.ekf2.covariance import rotation_vector_variances
+from ekf_fusion_ros.ekf2.events import EventKind
+from ekf_fusion_ros.ekf2.filter import Filter
+from ekf_fusion_ros.ekf2.gnss_checks import GnssChecks
+from ekf_fusion_ros.ekf2.heading import HeadingFusion
+from ekf_fusion_ros.ekf2.height import Height
+from ekf_fusion_ros.ekf2.resets import Resets
+from ekf_fusion_ros.ekf2.terrain import Terrain
+from ekf_fusion_ros.ekf2.validity import Validity
+from ekf_fusion_ros.ekf2.yaw_estimator import YawEstimator
+from ekf_fusion_ros.ekf2.yaw_recovery import YawRecovery
+
+TILT_ALIGNED_VARIANCE = math.radians(3.0) ** 2
+
+
+class Control:
+    """Owns the aid sources and steps them in their order."""
+
+    def __init__(self, f: Filter, observation_length: int) -> None:
+        """Build the sources on a filter."""
+        self._f = f
+        self.resets = Resets(f)
+        self.heading = HeadingFusion(f)
+        self.terrain = Terrain(f)
+        self.bank = YawEstimator()
+        self.checks = GnssChecks(f)
+        self.mag = Magnetometer(f, self.resets, self.heading, self.terrain, observation_length)
+        self.baro = Barometer(f, observation_length)
+        recovery = YawRecovery(f, self.resets, self.bank)
+        self.gnss = Gnss(f, self.resets, self.checks, recovery, observation_length)
+        self.vision = Vision(f, self.resets, self.heading, observation_length)
+        self.height = Height(f, self.resets, self.baro, self.gnss, self.checks, self.vision)
+        self.fake_position = FakePosition(f, self.resets)
+        self.validity = Validity(f)
+
+    def step(self) -> None:
+        """Run every source once, then terrain and the yaw bank."""
+        f = self._f
+        f.previous_flags.copy_from(f.flags)
+        if not f.flags.tilt_align:
+            self._check_tilt()
+        yaw_was_aligned = f.flags.yaw_align
+        self._check_arrivals()
+        gnss_popped = self.gnss.pop()
+        mag_popped = self.mag.pop()
+        self.baro.pop()
+        vision_popped = self.vision.pop()
+        healthy = self.checks.healthy
+
+        self.height.check_health()
+        self.mag.step(mag_popped)
+        self.gnss.step(gnss_popped)
+        self.height.step(gnss_popped, vision_popped)
+        self.vision.step(vision_popped, healthy, self.gnss.vision_yaw_forbidden)
+        self.fake_position.step(healthy)
+        self.validity.step()
+        if self.heading.covariance_lost:
+            self.heading.covariance_lost = False
+            initialise_covariance(f)
+        if f.flags.yaw_align and not yaw_was_aligned:
+            f.events.add(f.t_now, EventKind.YAW_ALIGNED)
+        self.terrain.step()
+        self._step_bank(gnss_popped)
+        self._note_activity()
+
+    def _check_tilt(self) -> None:
+        f = self._f
+        variances = rotation_vector_variances(f.x[0:4], f.cov.p)
+        if variances[0] + variances[1] < TILT_ALIGNED_VARIANCE:
+            f.flags.tilt_align = True
+            f.events.add(f.t_now, EventKind.TILT_ALIGNED)
+
+    def _check_arrivals(self) -> None:
+        """Judge whether sensors still deliver, before the horizon takes their samples."""
+        newest = self.gnss.buffer.newest_time_us
+        self.gnss.intermittent = not self._f.recent(newest, INTERMITTENT_US)
+        self.baro.check_arrival()
+
+    def _step_bank(self, gnss_popped: bool) -> None:
+        f = self._f
+        airspeed = f.params.yaw_estimator.default_airspeed if f.flags.fixed_wing else 0.0
+        self.bank.step(f.imu.increments, f.flags.in_air, airspeed, f.x[10:13] / f.dt_avg)
+        fix = f.fix
+        if gnss_popped and fix is not None and fix.has_velocity and fix.vacc > 0.0:
+            self.bank.set_velocity(fix.velocity, fix.vacc)
+
+    def _note_activity(self) -> None:
+        """Count starts and stops of each observation."""
+        f = self._f
+        flags, previous, seen = f.flags, f.previous_flags, f.observations
+        if flags == previous and f.holding_position == self._was_holding:
+            return
+        self._was_holding = f.holding_position
+        seen.gps_hor_pos.note_active(flags.gps)
+        seen.gps_hor_vel.note_active(flags.gps)
+        seen.gps_ver_vel.note_active(flags.gps)
+        seen.gps_height.note_active(flags.gps_hgt)
+        seen.ev_hor_pos.note_active(flags.ev_pos)
+        seen.ev_hor_vel.note_active(flags.ev_vel)
+        seen.ev_ver_vel.note_active(flags.ev_vel)
+        seen.ev_height.note_active(flags.ev_hgt)
+        seen.baro_height.note_active(flags.baro_hgt)
+        seen.mag.note_active(flags.mag_3d)
+        seen.declination.note_active(flags.mag_dec)
+        seen.yaw.note_active(flags.mag_hdg or flags.ev_yaw)
+        seen.fake_pos.note_active(f.holding_position)
+
+    _was_holding = False

@@ -1,0 +1,201 @@
+"""PX4's EKF2: 24 states at a delayed fusion horizon, predicted to now.
+
+Reference behaviour: PX4-ECL of July 2021. What differs, and why: docs/px4_differences.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ekf_fusion_ros.ekf2.alignment import Alignment
+from ekf_fusion_ros.ekf2.control import Control
+from ekf_fusion_ros.ekf2.filter import Filter
+from ekf_fusion_ros.ekf2.inertial_input import InertialInput
+from ekf_fusion_ros.ekf2.inertial_input import buffer_lengths
+from ekf_fusion_ros.ekf2.learning import AccelBiasLearning
+from ekf_fusion_ros.ekf2.report import health
+from ekf_fusion_ros.ekf2.report import nav_state
+from ekf_fusion_ros.estimator import AidStatus
+from ekf_fusion_ros.estimator import Event
+from ekf_fusion_ros.estimator import GeoPoint
+from ekf_fusion_ros.estimator import Health
+from ekf_fusion_ros.estimator import NavState
+from ekf_fusion_ros.kernels.prediction import limit_state
+from ekf_fusion_ros.kernels.prediction import predict_state
+from ekf_fusion_ros.params.ekf2 import Ekf2Params
+from ekf_fusion_ros.params.spec import validate
+from ekf_fusion_ros.samples import BaroSample
+from ekf_fusion_ros.samples import GnssSample
+from ekf_fusion_ros.samples import HeadingSample
+from ekf_fusion_ros.samples import ImuSample
+from ekf_fusion_ros.samples import LandedSample
+from ekf_fusion_ros.samples import MagSample
+from ekf_fusion_ros.samples import Sample
+from ekf_fusion_ros.samples import VisionSample
+
+Array = NDArray[np.float64]
+
+MIN_PERIOD_FOR_RATE = 2.5e-3
+
+
+class Ekf2:
+    """Attitude, velocity, position, sensor biases, magnetic field and wind from many sensors.
+
+    Measurements wait in buffers until the fusion horizon, which lags now by the largest sensor
+    delay, has passed them. The horizon advances with the inertial data; the output predictor carries
+    its state to now.
+    """
+
+    def __init__(self, params: Ekf2Params | None = None) -> None:
+        """Raise ValueError, naming the parameter, when one is out of range."""
+        self.params = params or Ekf2Params()
+        validate(self.params)
+        self._imu_length, self._observation_length = buffer_lengths(
+            max_delay_ms(self.params), self.params.timing.sensor_interval_min_ms)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything but the parameters."""
+        self.filter = Filter(self.params, self._imu_length)
+        self.control = Control(self.filter, self._observation_length)
+        self.inertial = InertialInput(self._imu_length, self._observation_length,
+                                      self.params.imu.moving_scaler)
+        self._alignment = Alignment(self.filter, self.control.mag, self.control.baro,
+                                    self.control.height, self._observation_length)
+        self._learning = AccelBiasLearning(self.filter)
+        self._imu_position = np.array(self.params.imu.position)
+        self._raw: ImuSample | None = None
+        self._period_complete = False
+        self.initialised = False
+
+    def push(self, sample: Sample) -> None:
+        """Queue a measurement; those before the first ImuSample have no effect."""
+        if isinstance(sample, ImuSample):
+            self._push_imu(sample)
+        elif not self.inertial.last_us:
+            return
+        elif isinstance(sample, MagSample):
+            self.control.mag.push(sample, self.inertial.min_interval_us)
+        elif isinstance(sample, BaroSample):
+            self.control.baro.push(sample, self.inertial.min_interval_us)
+        elif isinstance(sample, VisionSample):
+            self.control.vision.push(sample, self.inertial.min_interval_us)
+        elif isinstance(sample, GnssSample):
+            self._push_fix(sample)
+        elif isinstance(sample, HeadingSample):
+            self.control.vision.heading.push(sample)
+        elif isinstance(sample, LandedSample):
+            self._set_landed(sample)
+
+    def update(self) -> bool:
+        """Process the pushed ImuSample; True when the filter advanced by a period."""
+        raw, self._raw = self._raw, None
+        if raw is None:
+            return False
+        if not self.initialised and not self._initialise():
+            return False
+        complete = self._period_complete
+        if complete:
+            self._period_complete = False
+            self._predict()
+            self.control.step()
+        f = self.filter
+        f.output.propagate(raw, f.x, f.dt_imu_avg, f.dt_avg, self._imu_position)
+        if complete:
+            delay = 1e-6 * (f.t_now - f.t_horizon)
+            f.output.correct(f.x, delay, f.dt_imu_avg, f.dt_avg)
+        return complete
+
+    def _push_imu(self, sample: ImuSample) -> None:
+        if self._raw is not None:
+            self.update()
+        f = self.filter
+        self._raw = sample
+        if self.inertial.add(sample, f.flags.in_air):
+            self._period_complete = True
+            f.t_horizon = self.inertial.ring[0].time_us
+        f.flags.vehicle_at_rest = self.inertial.at_rest
+        f.t_now = sample.time_us
+        f.dt_imu_avg = self.inertial.dt_avg
+
+    def _push_fix(self, sample: GnssSample) -> None:
+        interval = self.inertial.min_interval_us
+        origin_set = self.control.gnss.push(sample, interval, self.initialised)
+        if origin_set and self.params.height.reference == 'gnss':
+            self.control.height.start_gnss()
+
+    def _set_landed(self, sample: LandedSample) -> None:
+        f = self.filter
+        f.flags.in_air = not sample.landed
+        f.flags.fixed_wing = sample.fixed_wing
+        f.flags.fuse_beta = sample.fuse_beta and not sample.landed
+        if sample.landed:
+            f.last_on_ground_us = f.t_now
+        else:
+            f.last_in_air_us = f.t_now
+
+    def _initialise(self) -> bool:
+        ring = self.inertial.ring
+        if not ring or not self._alignment.attempt(ring[-1]):
+            return False
+        f = self.filter
+        self.control.terrain.initialise()
+        times = f.times
+        times.hgt = times.hor_pos = times.del_pos = times.hor_vel = times.flow = f.t_now
+        f.output.align(f.x)
+        self.initialised = True
+        return True
+
+    def _predict(self) -> None:
+        """Carry states and covariance over the filter period at the horizon."""
+        f = self.filter
+        f.imu = self.inertial.ring[0]
+        increments = f.imu.increments
+        predict_state(f.x, f.rot, increments, f.earth.rate_ned, f.accel_lpf)
+        limit_state(f.x, f.dt_avg, self.params.imu.accel_bias_limit)
+        mean_dt = 0.5 * float(increments[6] + increments[7])
+        f.dt_avg = 0.99 * f.dt_avg + 0.01 * min(max(mean_dt, 0.005), 0.02)
+        if increments[6] > MIN_PERIOD_FOR_RATE:
+            f.rate = increments[0:3] / increments[6]
+        self._learning.step()
+        f.cov.wind_active = f.flags.wind
+        f.cov.predict(f.x, increments, f.dt_avg, f.faults.accel_vertical, f.imu.clipping, 0.0)
+        self._learning.check_consistency()
+
+    def nav_state(self) -> NavState | None:
+        """Return the state predicted to the newest IMU sample, None before initialisation."""
+        return nav_state(self) if self.initialised else None
+
+    def aid_statuses(self) -> Sequence[AidStatus]:
+        """Return one record per kind of observation that was ever tried."""
+        return [o.status() for o in self.filter.observations.all() if o.judged or o.starts]
+
+    def drain_events(self) -> Sequence[Event]:
+        """Return and forget the events since the last call."""
+        return self.filter.events.drain()
+
+    def health(self) -> Health:
+        """Say in one sentence what the filter is doing."""
+        return health(self)
+
+    def set_origin(self, origin: GeoPoint) -> bool:
+        """Move the origin of the local frame, keeping the place of the vehicle on the earth."""
+        return self.control.gnss.move_origin(origin)
+
+
+def max_delay_ms(params: Ekf2Params) -> float:
+    """Return the delay of the fusion horizon in ms: the largest of the sensors in use."""
+    delays = [params.timing.horizon_min_ms, params.baro.delay_ms, params.aiding.auxvel_delay_ms]
+    if params.aiding.airspeed_threshold > 0.0:
+        delays.append(params.aiding.airspeed_delay_ms)
+    if params.mag.type != 'none':
+        delays.append(params.mag.delay_ms)
+    if params.gnss.enabled:
+        delays.append(params.gnss.delay_ms)
+    vision = params.vision
+    if vision.use_position or vision.use_velocity or vision.use_yaw:
+        delays.append(vision.delay_ms)
+    return max(delays)

@@ -1,0 +1,85 @@
+"""Inertial input: down-sampling to the filter rate, vibration metrics, rest detection."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from ekf_fusion_ros.ekf2.filter import DelayedImu
+from ekf_fusion_ros.ekf2.state import SECOND
+from ekf_fusion_ros.kernels.inertial import accumulate_imu
+from ekf_fusion_ros.kernels.inertial import update_vibration
+from ekf_fusion_ros.samples import ImuSample
+
+DT_MIN = 1e-4
+DT_MAX = 0.02
+REST_TIME_US = SECOND
+ANGLE_VIBRATION_LIMIT = 1.0 / 4.0e4
+VELOCITY_VIBRATION_LIMIT = 1.0 / 2.1e2
+RATE_LIMIT = 0.05
+
+
+class InertialInput:
+    """The ring of filter periods between now and the fusion horizon."""
+
+    def __init__(self, length: int, observation_length: int, moving_scaler: float) -> None:
+        """Keep `length` filter periods; observation buffers hold `observation_length` samples."""
+        self.ring: deque[DelayedImu] = deque(maxlen=length)
+        self._observation_length = observation_length
+        self._moving_scaler = moving_scaler
+        self.dt_avg = 0.0
+        self.last_us = 0
+        self.min_interval_us = 0
+        self.vibration = np.zeros(3)
+        self.at_rest = False
+        self._last_move_us = 0
+        self._previous = np.zeros(6)
+        self._quat = np.array((1.0, 0.0, 0.0, 0.0))
+        self._velocity = np.zeros(3)
+        self._clock = np.zeros(2, dtype=np.float32)
+        self._sums = np.zeros(1)
+        self._clipping = (False, False, False)
+
+    def add(self, sample: ImuSample, in_air: bool) -> bool:
+        """Take a raw sample; True when it completed a filter period."""
+        dt = min(max(1e-6 * (sample.time_us - self.last_us), DT_MIN), DT_MAX)
+        self.last_us = sample.time_us
+        self.dt_avg = 0.8 * self.dt_avg + 0.2 * dt
+        update_vibration(sample.delta_angle, sample.delta_velocity, self._previous,
+                         self.vibration)
+        self._detect_rest(sample, dt, in_air)
+        if sample.clipping != (False, False, False) or any(self._clipping):
+            x, y, z = (bool(a or b) for a, b in zip(self._clipping, sample.clipping))
+            self._clipping = (x, y, z)
+        period = np.empty(8)
+        if not accumulate_imu(sample.delta_angle, sample.delta_velocity, sample.delta_angle_dt,
+                              sample.delta_velocity_dt, self._quat, self._velocity, self._clock,
+                              self._sums, period):
+            return False
+        self.ring.append(DelayedImu(sample.time_us, period, self._clipping))
+        self._clipping = (False, False, False)
+        span = sample.time_us - self.ring[0].time_us
+        self.min_interval_us = span // (self._observation_length - 1)
+        return True
+
+    def _detect_rest(self, sample: ImuSample, dt: float, in_air: bool) -> None:
+        scale = self._moving_scaler
+        a = sample.delta_angle
+        moving = (
+            in_air
+            or self.vibration[1] > ANGLE_VIBRATION_LIMIT * scale
+            or self.vibration[2] > VELOCITY_VIBRATION_LIMIT * scale
+            or (a[0] * a[0] + a[1] * a[1] + a[2] * a[2]) > (RATE_LIMIT * scale * dt) ** 2)
+        if moving:
+            self._last_move_us = sample.time_us
+        self.at_rest = sample.time_us - self._last_move_us > REST_TIME_US
+
+
+def buffer_lengths(
+    max_delay_ms: float, sensor_interval_ms: float, filter_period_ms: float = 10.0,
+) -> tuple[int, int]:
+    """Return the lengths of the inertial ring and of the observation buffers."""
+    imu = int(np.ceil(max_delay_ms / filter_period_ms)) + 1
+    observations = int(np.ceil(1.5 * max_delay_ms / sensor_interval_ms))
+    return imu, max(2, min(imu, observations))

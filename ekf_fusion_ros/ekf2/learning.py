@@ -1,0 +1,69 @@
+"""When accelerometer biases may be learned, and when what was learned is implausible."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ekf_fusion_ros.ekf2.events import EventKind
+from ekf_fusion_ros.ekf2.filter import Filter
+from ekf_fusion_ros.ekf2.state import FILTER_PERIOD
+from ekf_fusion_ros.ekf2.state import SECOND
+
+OBSERVABLE_COS = 0.8
+INCONSISTENT_US = 7 * SECOND
+
+
+class AccelBiasLearning:
+    """Inhibits the bias states in violent motion, on unobservable axes and while clipping."""
+
+    def __init__(self, f: Filter) -> None:
+        """Act on a filter."""
+        self._f = f
+        self._rate_peak = 0.0
+        self._accel_peak = 0.0
+        self._consistent_us = 0
+
+    def step(self) -> None:
+        """Decide for each axis; once per filter period, before the covariance prediction."""
+        f = self._f
+        imu = f.params.imu
+        d = f.imu.increments
+        share = FILTER_PERIOD / imu.accel_bias_learn_time
+        self._rate_peak = max(float(np.linalg.norm(d[0:3])) / FILTER_PERIOD,
+                              (1.0 - share) * self._rate_peak)
+        self._accel_peak = max(float(np.linalg.norm(d[3:6])) / FILTER_PERIOD,
+                               (1.0 - share) * self._accel_peak)
+        violent = (self._rate_peak > imu.accel_bias_learn_gyro_limit
+                   or self._accel_peak > imu.accel_bias_learn_accel_limit)
+        inhibit_all = imu.inhibit_accel_bias or violent or f.faults.accel_vertical
+        f.faults.accel_clipping = any(f.imu.clipping)
+        for axis in range(3):
+            observable = f.flags.in_air or abs(f.rot[2, axis]) > OBSERVABLE_COS
+            inhibit = inhibit_all or not observable or f.imu.clipping[axis]
+            f.cov.inhibit_accel_bias(axis, inhibit)
+
+    def check_consistency(self) -> None:
+        """Forget a bias that both vertical velocity and height have opposed for 7 s."""
+        f = self._f
+        down_bias = float(f.x[13:16] @ f.rot[2])
+        limit = 0.9 * f.params.imu.accel_bias_limit * f.dt_avg
+        if abs(down_bias) <= limit or not self._opposed(down_bias):
+            f.faults.accel_bias = False
+            self._consistent_us = f.t_now
+            return
+        f.faults.accel_bias = True
+        if f.late(self._consistent_us, INCONSISTENT_US):
+            f.cov.decorrelate(13, 3)
+            self._consistent_us = f.t_now
+            f.faults.accel_bias = False
+            f.events.add(f.t_now, EventKind.ACCEL_BIAS_RESET)
+
+    def _opposed(self, down_bias: float) -> bool:
+        seen, flags = self._f.observations, self._f.flags
+        by_velocity = ((flags.gps and down_bias * seen.gps_ver_vel.innovation[0] < 0.0)
+                       or (flags.ev_vel and down_bias * seen.ev_ver_vel.innovation[0] < 0.0))
+        by_height = (
+            (flags.baro_hgt and down_bias * seen.baro_height.innovation[0] < 0.0)
+            or (flags.gps_hgt and down_bias * seen.gps_height.innovation[0] < 0.0)
+            or (flags.ev_hgt and down_bias * seen.ev_height.innovation[0] < 0.0))
+        return by_velocity and by_height

@@ -1,0 +1,126 @@
+"""The filter as the outside sees it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ekf_fusion_ros.ekf2.covariance import quat_by_rotation_vector
+from ekf_fusion_ros.estimator import Health
+from ekf_fusion_ros.estimator import HealthLevel
+from ekf_fusion_ros.estimator import NavState
+from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
+
+if TYPE_CHECKING:
+    from ekf_fusion_ros.ekf2.ekf2 import Ekf2
+
+Array = NDArray[np.float64]
+
+
+def attitude_error_jacobian(q: Array) -> Array:
+    """Return d(small earth-frame rotation)/d(quaternion), (3, 4): 2 [-v, w I - [v x]]."""
+    w, x, y, z = q
+    return 2.0 * np.array(((-x, w, -z, y), (-y, z, w, -x), (-z, -y, x, w)))
+
+
+def pose_covariance(q: Array, p: Array) -> Array:
+    """Return (6, 6): position NED, then small rotations about the earth axes."""
+    jacobian = np.zeros((6, 24))
+    jacobian[0:3, 7:10] = np.eye(3)
+    jacobian[3:6, 0:4] = attitude_error_jacobian(q)
+    covariance: Array = jacobian @ p @ jacobian.T
+    return covariance
+
+
+def nav_state(ekf: Ekf2) -> NavState:
+    """Return the output predictor's state at the body origin."""
+    f = ekf.filter
+    out = f.output
+    q = out.now[0:4].copy()
+    rot = matrix_from_quat(q)
+    lever = np.asarray(ekf.params.imu.position)
+    p = f.cov.p
+    validity = ekf.control.validity
+    gyro_bias = f.x[10:13] / f.dt_avg
+    return NavState(
+        time_us=f.t_now,
+        quaternion=q,
+        velocity=out.now[4:7] - out.velocity_offset,
+        position=out.now[7:10] - rot @ lever,
+        angular_rate=out.rate - gyro_bias,
+        pose_cov=pose_covariance(f.x[0:4], p),
+        velocity_cov=p[4:7, 4:7].copy(),
+        gyro_bias=gyro_bias,
+        accel_bias=f.x[13:16] / f.dt_avg,
+        origin=f.earth.origin(),
+        yaw_aligned=f.flags.yaw_align,
+        dead_reckoning=f.dead_reckoning,
+        local_position_valid=validity.local_position,
+        global_position_valid=validity.global_position,
+    )
+
+
+def health(ekf: Ekf2) -> Health:
+    """Return the first thing that is not as it should be, or what is being fused."""
+    level, text = _state(ekf)
+    return Health(level, text, _values(ekf))
+
+
+def _state(ekf: Ekf2) -> tuple[HealthLevel, str]:
+    f = ekf.filter
+    flags = f.flags
+    if not f.t_now:
+        return HealthLevel.WARN, 'waiting for inertial data'
+    if not ekf.initialised:
+        return HealthLevel.WARN, 'gathering samples for the initial alignment'
+    if not flags.tilt_align:
+        return HealthLevel.WARN, 'aligning tilt'
+    if not flags.yaw_align:
+        return HealthLevel.WARN, 'aligning yaw'
+    wants_gnss = ekf.params.gnss.enabled
+    if wants_gnss and not f.earth.has_origin:
+        failed = [n for n, r in ekf.control.checks.results.items() if r.failed]
+        reason = f' ({", ".join(failed)} failing)' if failed else ''
+        return HealthLevel.WARN, f'waiting for the GNSS checks to pass{reason}'
+    if f.dead_reckoning:
+        seconds = (f.t_now - f.last_aiding_us) * 1e-6 if f.last_aiding_us else math.inf
+        return HealthLevel.ERROR, f'dead reckoning on inertial data for {seconds:.0f} s'
+    if wants_gnss and not flags.gps:
+        return HealthLevel.WARN, f'GNSS not used; {_sources(ekf)}'
+    return HealthLevel.OK, f'ok: {_sources(ekf)}'
+
+
+def _sources(ekf: Ekf2) -> str:
+    flags = ekf.filter.flags
+    words = (
+        (flags.gps, 'GNSS'), (flags.ev_pos, 'odometry position'),
+        (flags.ev_vel, 'odometry velocity'), (flags.ev_yaw, 'odometry yaw'),
+        (flags.mag_3d, '3-axis magnetometer'), (flags.mag_hdg, 'magnetic heading'),
+        (flags.baro_hgt, 'barometric height'), (flags.gps_hgt, 'GNSS height'),
+        (flags.ev_hgt, 'odometry height'))
+    return 'fusing ' + (', '.join(word for on, word in words if on) or 'nothing')
+
+
+def _values(ekf: Ekf2) -> dict[str, str]:
+    f = ekf.filter
+    p = f.cov.p
+    quat_jacobian = quat_by_rotation_vector(f.x[0:4])
+    tilt = np.linalg.pinv(quat_jacobian) @ p[0:4, 0:4] @ np.linalg.pinv(quat_jacobian).T
+    vibration = ekf.inertial.vibration
+    return {
+        'horizontal_position_sigma': f'{math.sqrt(max(p[7, 7] + p[8, 8], 0.0)):.3f}',
+        'height_sigma': f'{math.sqrt(max(p[9, 9], 0.0)):.3f}',
+        'velocity_sigma': f'{math.sqrt(max(float(np.trace(p[4:7, 4:7])), 0.0)):.3f}',
+        'attitude_sigma_deg': f'{math.degrees(math.sqrt(max(float(np.trace(tilt)), 0.0))):.2f}',
+        'resets': str(ekf.control.resets.counters.total()),
+        'horizon_delay': f'{1e-6 * (f.t_now - f.t_horizon):.3f}',
+        'vibration_coning': f'{vibration[0]:.3g}',
+        'vibration_angle': f'{vibration[1]:.3g}',
+        'vibration_velocity': f'{vibration[2]:.3g}',
+        'output_attitude_error': f'{f.output.tracking_error[0]:.4f}',
+        'output_velocity_error': f'{f.output.tracking_error[1]:.4f}',
+        'output_position_error': f'{f.output.tracking_error[2]:.4f}',
+    }

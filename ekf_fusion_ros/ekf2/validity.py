@@ -1,0 +1,43 @@
+"""Whether position can be trusted: dead reckoning and its duration."""
+
+from __future__ import annotations
+
+from ekf_fusion_ros.ekf2.filter import Filter
+from ekf_fusion_ros.ekf2.state import SECOND
+
+AIDING_RECENT_US = SECOND
+
+
+class Validity:
+    """Derived from the fusion times; nothing feeds back but the flag itself."""
+
+    def __init__(self, f: Filter) -> None:
+        """Act on a filter."""
+        self._f = f
+        self._exceeded = True
+
+    def step(self) -> None:
+        """Run once per filter period, last."""
+        f = self._f
+        times, flags = f.times, f.flags
+        newest = max(times.hor_pos, times.hor_vel, times.del_pos)
+        aided = ((flags.gps or flags.ev_pos or flags.ev_vel)
+                 and f.recent(newest, AIDING_RECENT_US))
+        flow_aided = flags.opt_flow and f.recent(times.flow, AIDING_RECENT_US)
+        air_aided = (flags.wind and f.recent(times.airspeed, AIDING_RECENT_US)
+                     and f.recent(times.sideslip, AIDING_RECENT_US))
+        f.dead_reckoning = not aided and not flow_aided and not air_aided
+        if not f.dead_reckoning:
+            f.last_aiding_us = f.t_now - AIDING_RECENT_US
+        timeout = round(f.params.aiding.valid_timeout * SECOND)
+        self._exceeded = f.last_aiding_us == 0 or f.late(f.last_aiding_us, timeout)
+
+    @property
+    def local_position(self) -> bool:
+        """True while the local position is constrained by measurements."""
+        return not self._exceeded and not self._f.holding_position
+
+    @property
+    def global_position(self) -> bool:
+        """True while the position on the earth is known."""
+        return self.local_position and self._f.earth.has_origin

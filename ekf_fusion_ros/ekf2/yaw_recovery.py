@@ -1,0 +1,109 @@
+"""Yaw from the EKF-GSF bank: alignment without a compass, and rescue after a bad one."""
+
+from __future__ import annotations
+
+import math
+
+from ekf_fusion_ros.ekf2.events import EventKind
+from ekf_fusion_ros.ekf2.filter import Filter
+from ekf_fusion_ros.ekf2.resets import Resets
+from ekf_fusion_ros.ekf2.state import SECOND
+from ekf_fusion_ros.ekf2.yaw_estimator import YawEstimator
+
+YAW_SIGMA_MAX = 0.262
+RETRY_US = 5 * SECOND
+TAKE_OFF_US = 30 * SECOND
+REJECTED_US = 1 * SECOND
+FIX_GAP_US = 1 * SECOND
+MAX_RESETS = 3
+COURSE_ERROR_COS2 = math.cos(math.radians(25.0)) ** 2
+MIN_SPEED_SQUARED = 0.16
+"""Squared speed in (m/s)^2 below which a course says nothing about yaw."""
+
+
+class YawRecovery:
+    """Decides when the yaw of the bank replaces that of the filter."""
+
+    def __init__(self, f: Filter, resets: Resets, bank: YawEstimator) -> None:
+        """Act on a filter through its resets."""
+        self._f = f
+        self._resets = resets
+        self._bank = bank
+        self._requested = False
+        self._last_reset_us = 0
+        self._count = 0
+
+    def request(self) -> None:
+        """Ask for alignment from the bank as soon as it is certain."""
+        self._requested = True
+        self._last_reset_us = 0
+
+    def align_without_gnss(self, gnss_healthy: bool) -> None:
+        """Serve a pending request while GNSS waits for a yaw."""
+        f = self._f
+        if f.flags.yaw_align:
+            # aligned by other means: the request is served
+            self._requested = False
+            return
+        if self._requested and f.late(self._last_reset_us, RETRY_US) and self._reset(
+                gnss_healthy):
+            self._last_reset_us = f.t_now
+            self._requested = False
+
+    def step(self, timed_out: bool, previous_fix_us: int, gnss_healthy: bool) -> bool:
+        """Reset yaw when GNSS velocity says it is wrong; True rules out other resets."""
+        f = self._f
+        if not self._yaw_failed(timed_out):
+            return False
+        may_retry = self._count < MAX_RESETS and f.late(self._last_reset_us, RETRY_US)
+        if not may_retry or f.late(previous_fix_us, FIX_GAP_US):
+            return False
+        if self._reset(gnss_healthy):
+            self._last_reset_us = f.t_now
+            self._count += 1
+            times = f.times
+            times.hor_pos = times.del_pos = times.hor_vel = times.flow = f.t_now
+        return True
+
+    def _yaw_failed(self, timed_out: bool) -> bool:
+        f = self._f
+        times = f.times
+        flown = times.hor_vel > f.last_on_ground_us
+        after_take_off = not f.late(f.last_on_ground_us, TAKE_OFF_US)
+        bad_take_off = (f.flags.in_air and after_take_off
+                        and f.late(times.hor_vel, REJECTED_US) and flown)
+        bad_flight = (f.flags.in_air and timed_out and flown
+                      and times.hor_pos > f.last_on_ground_us)
+        if not (bad_take_off or bad_flight) or times.hor_vel == 0:
+            return False
+        return self._courses_differ()
+
+    def _courses_differ(self) -> bool:
+        """Compare the course of the last velocity observation with that of the state."""
+        f = self._f
+        observed, noise = f.last_velocity, f.last_velocity_variance
+        speed2 = float(observed @ observed)
+        own2 = float(f.x[4] ** 2 + f.x[5] ** 2)
+        own_noise = float(f.cov.p[4, 4] + f.cov.p[5, 5])
+        both_move = (speed2 > max(16.0 * float(noise[0] + noise[1]), MIN_SPEED_SQUARED)
+                     and own2 > max(16.0 * own_noise, MIN_SPEED_SQUARED))
+        if not both_move:
+            return False
+        dot = float(observed[0] * f.x[4] + observed[1] * f.x[5])
+        return dot < 0.0 or dot * dot < COURSE_ERROR_COS2 * speed2 * own2
+
+    def _reset(self, gnss_healthy: bool) -> bool:
+        f = self._f
+        variance = self._bank.variance
+        if not self._bank.running or not variance < YAW_SIGMA_MAX ** 2:
+            return False
+        self._resets.yaw(self._bank.yaw, variance)
+        self._resets.velocity_to_aiding(gnss_healthy)
+        self._resets.position_to_aiding()
+        f.flags.yaw_align = True
+        if f.params.mag.type == 'none':
+            f.events.add(f.t_now, EventKind.YAW_ALIGNED_IMU_GPS)
+        else:
+            f.flags.mag_fault = True
+            f.events.add(f.t_now, EventKind.EMERGENCY_YAW_RESET)
+        return True

@@ -1,0 +1,85 @@
+"""Magnetic field in body axes: prediction, Jacobian and the update of one axis.
+
+h = R(q)' m_earth + m_body with R quadratic in q; with v the vector part of q,
+    R' m = (q0^2 - v.v) m + 2 v (v.m) - 2 q0 v x m   (Sola 2017, eq. 115, transposed).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ekf_fusion_ros.kernels.compile import kernel
+from ekf_fusion_ros.kernels.update import apply_update
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def field_jacobian(x: Array, axis: int, h: Array) -> float:
+    """Fill h (24,) with the gradient of one body axis and return its prediction, Gauss."""
+    q0, v0, v1, v2 = x[0], x[1], x[2], x[3]
+    m = x[16:19]
+    vm = v0 * m[0] + v1 * m[1] + v2 * m[2]
+    j = (axis + 1) % 3
+    k = (axis + 2) % 3
+    v = x[1:4]
+    cross = v[j] * m[k] - v[k] * m[j]
+    vv = v0 * v0 + v1 * v1 + v2 * v2
+    h[:] = 0.0
+    h[0] = 2.0 * (q0 * m[axis] - cross)
+    h[1 + axis] = 2.0 * vm
+    for i in range(3):
+        h[1 + i] += 2.0 * (v[axis] * m[i] - m[axis] * v[i])
+        h[16 + i] = 2.0 * v[axis] * v[i]
+    h[16 + axis] += q0 * q0 - vv
+    # 2 q0 [m x] v, row `axis`: m_j v_k - m_k v_j
+    h[1 + k] += 2.0 * q0 * m[j]
+    h[1 + j] -= 2.0 * q0 * m[k]
+    # -2 q0 (v x m), row `axis`: v_j m_k - v_k m_j
+    h[16 + k] -= 2.0 * q0 * v[j]
+    h[16 + j] += 2.0 * q0 * v[k]
+    h[19 + axis] = 1.0
+    return (q0 * q0 - vv) * m[axis] + 2.0 * v[axis] * vm - 2.0 * q0 * cross + x[19 + axis]
+
+
+@kernel
+def predict_field(
+    x: Array, p: Array, measured: Array, noise: float, innovation: Array, variance: Array,
+) -> None:
+    """Fill innovation (3,) in Gauss and its variance (3,) in Gauss^2."""
+    h = np.empty(24)
+    for axis in range(3):
+        innovation[axis] = field_jacobian(x, axis, h) - measured[axis]
+        variance[axis] = np.dot(h, np.dot(p, h)) + noise
+
+
+@kernel
+def fuse_field_axis(
+    x: Array, p: Array, axis: int, innovation: float, noise: float, all_states: bool,
+    inhibited: Array, accel_bias_var_max: float, wind_active: bool, variance: Array,
+) -> int:
+    """Fuse one axis; 0 = done, 1 = innovation variance below the noise, 2 = P unhealthy.
+
+    The Jacobian is taken at the present x. Unless all_states, only the field states are corrected.
+    """
+    h = np.empty(24)
+    field_jacobian(x, axis, h)
+    hp = np.dot(h, p)
+    s = np.dot(hp, h) + noise
+    if s < noise:
+        return 1
+    variance[axis] = s
+    gain = np.dot(p, h) / s
+    for k in range(3):
+        if inhibited[k] != 0.0:
+            gain[13 + k] = 0.0
+    if not all_states:
+        gain[0:16] = 0.0
+        gain[22:24] = 0.0
+    if not wind_active:
+        gain[22:24] = 0.0
+    if apply_update(p, x, gain, hp, innovation, inhibited, accel_bias_var_max, True,
+                    wind_active):
+        return 0
+    return 2
