@@ -11,6 +11,11 @@ import pytest
 SHARED_DATA = Path(__file__).resolve().parents[2] / '..' / 'shared' / 'data'
 
 
+def diagonal(variances):
+    """Return a row-major covariance."""
+    return np.diag(np.array(variances, dtype=float)).ravel()
+
+
 class Build:
     """Builds messages that decode; a test then spoils one field."""
 
@@ -33,14 +38,14 @@ class Build:
         twist = SimpleNamespace(linear=self.vector(0.5, -0.25, 0.125), angular=self.vector())
         return SimpleNamespace(
             header=self.header(parent), child_frame_id=child,
-            pose=SimpleNamespace(pose=pose, covariance=np.diag(pose_var).ravel().astype(float)),
-            twist=SimpleNamespace(twist=twist, covariance=np.diag(twist_var).ravel().astype(float)))
+            pose=SimpleNamespace(pose=pose, covariance=diagonal(pose_var)),
+            twist=SimpleNamespace(twist=twist, covariance=diagonal(twist_var)))
 
     def fix(self, kind=2, variances=(1.0, 4.0, 9.0)):
         return SimpleNamespace(
             header=self.header('gps'), status=SimpleNamespace(status=0, service=1),
             latitude=47.4, longitude=8.5, altitude=488.0,
-            position_covariance=np.diag(variances).ravel().astype(float), position_covariance_type=kind)
+            position_covariance=diagonal(variances), position_covariance_type=kind)
 
     def fix_velocity(self, variances=(0.09, 0.16, 0.25), frame_id='gps'):
         twist = SimpleNamespace(linear=self.vector(1.0, 2.0, 3.0), angular=self.vector())
