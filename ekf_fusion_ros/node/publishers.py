@@ -9,6 +9,7 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import NavSatFix
 
 from ekf_fusion_ros.estimator import GeoPoint
+from ekf_fusion_ros.fused_output import FusedOutput
 from ekf_fusion_ros.geo.projection import Projection
 from ekf_fusion_ros.geo.projection import make_projection
 from ekf_fusion_ros.messages.encode import NavSatFixFields
@@ -19,7 +20,6 @@ from ekf_fusion_ros.messages.encode import encode_odometry
 from ekf_fusion_ros.messages.stamps import seconds_nanoseconds
 from ekf_fusion_ros.node.qos import output_qos
 from ekf_fusion_ros.params.tree import Params
-from ekf_fusion_ros.session import FusedOutput
 
 
 class Publishers:
