@@ -22,8 +22,8 @@ LAYERS = (
     ('ekf2', 'lpe', 'health', 'odometry_imu', 'motion_heading'),
     ('messages',),
     (
-        'session', 'holding', 'inputs', 'odometry_heading', 'pairing', 'roles', 'stamp_order',
-        'statistics',
+        'session', 'fused_output', 'holding', 'inputs', 'odometry_heading', 'pairing', 'roles',
+        'stamp_order', 'statistics',
     ),
     ('analysis',),
     ('node', 'replay'),

@@ -47,11 +47,6 @@ def load_file(path: str | Path, base: Params | None = None) -> LoadedParams:
         raise ValueError(f'{path}: cannot be read ({error.strerror})') from None
 
 
-def load(path: str | Path, base: Params | None = None) -> Params:
-    """Return the parameters of `load_file` where the rest of the file does not matter."""
-    return load_file(path, base).params
-
-
 def _load_yaml(path: Path, base: Params) -> LoadedParams:
     values, unused = read_yaml(path)
     return LoadedParams(_applied(path, base, values), unused)
