@@ -82,6 +82,13 @@ class InertialInput:
         samples: list[ImuSample] = self._odometry.push(reading)
         return samples
 
+    def fused(self, reading: VisionSample) -> VisionSample:
+        """Return the odometry sample that was just pushed as the estimator should fuse it."""
+        if self._odometry is None:
+            return reading
+        sample: VisionSample | None = self._odometry.fused()
+        return reading if sample is None else sample
+
 
 def make_estimator(params: Params) -> Estimator:
     """Return the estimator that the parameters name."""
@@ -100,4 +107,5 @@ def make_motion_heading(params: Params, roles: Collection[str]) -> Any:
     if not (FIX in roles and ODOMETRY in roles):
         return None
     from ekf_fusion_ros.motion_heading import MotionHeading
-    return MotionHeading(params.two_topic)
+    delay_ms = params.ekf2.gnss.delay_ms - params.ekf2.vision.delay_ms
+    return MotionHeading(params.two_topic, round(1000 * delay_ms))

@@ -221,7 +221,7 @@ class FusionSession:
         self._heading.push(sample)
         if self._motion is not None:
             self._motion.push_odometry(sample)
-        self._estimator.push(sample)
+        self._estimator.push(sample if self._inertial is None else self._inertial.fused(sample))
 
     def _push_fixes(self, fixes: Sequence[GnssSample]) -> None:
         for fix in fixes:
@@ -230,7 +230,12 @@ class FusionSession:
     def _push_fix(self, fix: GnssSample) -> None:
         self._fixes.append(fix)
         self._estimator.push(fix)
-        heading = None if self._motion is None else self._motion.push_fix(fix)
+        if self._motion is None:
+            return
+        held = self.alignment()
+        if held is not None:
+            self._motion.hold(-held[0], held[1])
+        heading = self._motion.push_fix(fix)
         if heading is not None:
             self._estimator.push(heading)
 
@@ -243,10 +248,11 @@ class FusionSession:
     def _run(self, role: str, reading: Any) -> list[FusedOutput]:
         """Step through the increments that end with a message of the inertial role."""
         assert self._inertial is not None
+        outputs: list[FusedOutput] = []
+        increments = self._inertial.push(reading)
         if role == ODOMETRY:
             self._push_odometry(reading)
-        outputs: list[FusedOutput] = []
-        for imu in self._inertial.push(reading):
+        for imu in increments:
             if self._now_us is None and self.params.session.assume_in_air:
                 self._estimator.push(LandedSample(imu.time_us, landed=False))
             for due in self._holding.release(imu.time_us):

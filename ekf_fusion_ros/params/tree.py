@@ -20,6 +20,7 @@ from ekf_fusion_ros.params.session import SessionParams
 from ekf_fusion_ros.params.spec import leaves
 from ekf_fusion_ros.params.spec import param
 from ekf_fusion_ros.params.spec import validate
+from ekf_fusion_ros.params.two_topic import TwoTopicParams
 
 TRUE_WORDS = ('true', 'yes', 'on', '1')
 FALSE_WORDS = ('false', 'no', 'off', '0')
@@ -33,6 +34,7 @@ class Params:
     ekf2: Ekf2Params = field(default_factory=Ekf2Params)
     messages: MessageParams = field(default_factory=MessageParams)
     session: SessionParams = field(default_factory=SessionParams)
+    two_topic: TwoTopicParams = field(default_factory=TwoTopicParams)
     node: NodeParams = field(default_factory=NodeParams)
 
     def __post_init__(self) -> None:
