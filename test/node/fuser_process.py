@@ -27,12 +27,16 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 class Fuser:
     """`fuser` as a process; its output goes to a file."""
 
-    def __init__(self, log: Path, **parameters: Any) -> None:
+    def __init__(
+        self, log: Path, parameters: Mapping[str, Any], remappings: Mapping[str, str],
+    ) -> None:
         self._log = log
         command = [sys.executable, '-m', 'ekf_fusion_ros.node.fusion_node', '--ros-args']
         for name, value in parameters.items():
             text = str(value).lower() if isinstance(value, bool) else str(value)
-            command += ['-p', f'{name.replace("__", ".")}:={text}']
+            command += ['-p', f'{name}:={text}']
+        for name, topic in remappings.items():
+            command += ['-r', f'{name}:={topic}']
         with log.open('wb') as stream:
             self.process = subprocess.Popen(
                 command, stdout=stream, stderr=subprocess.STDOUT, cwd=REPOSITORY)

@@ -67,22 +67,22 @@ def test_signals_end_the_node_cleanly(
 
 
 @pytest.mark.parametrize(('parameters', 'words'), [
-    ({'ekf2__gnss__delay_ms': -1.0}, 'ekf2.gnss.delay_ms'),
-    ({'ekf2__gnss__no_such_thing': 1.0}, 'unknown parameter ekf2.gnss.no_such_thing'),
-    ({'node__use_odometry': False}, 'inertial input'),
-    ({'node__use_fix': False, 'node__use_fix_velocity': True}, 'fix_velocity needs a fix'),
+    ({'ekf2.gnss.delay_ms': -1.0}, 'ekf2.gnss.delay_ms'),
+    ({'ekf2.gnss.no_such_thing': 1.0}, 'unknown parameter ekf2.gnss.no_such_thing'),
+    ({'node.use_odometry': False}, 'inertial input'),
+    ({'node.use_fix': False, 'node.use_fix_velocity': True}, 'fix_velocity needs a fix'),
 ])
 def test_unusable_parameters_are_refused(
     start_fuser: StartFuser, parameters: dict[str, object], words: str,
 ) -> None:
-    fuser = start_fuser(**parameters)
+    fuser = start_fuser(parameters)
     assert fuser.wait() == 2
     assert len(fuser.output.splitlines()) == 1
     assert words in fuser.output
 
 
 def test_topics_have_their_quality_of_service(start_fuser: StartFuser, peer: Peer) -> None:
-    fuser = start_fuser(node__use_imu=True)
+    fuser = start_fuser({'node.use_imu': True})
     peer.connect(fuser, TWO_TOPICS)
     for topic in ('/odometry/filtered', '/odometry/gps', '/gps/filtered'):
         profiles = [info.qos_profile for info in peer.node.get_publishers_info_by_topic(topic)]
@@ -159,7 +159,7 @@ def test_bad_messages_are_counted_and_the_node_lives_on(
 
 
 def test_overflow_of_the_queue_is_counted(start_fuser: StartFuser, peer: Peer) -> None:
-    fuser = start_fuser(node__queue_limit=10, node__core_rate=1.0)
+    fuser = start_fuser({'node.queue_limit': 10, 'node.core_rate': 1.0})
     peer.connect(fuser, TWO_TOPICS)
     sent = 0
     while not peer.count('odometry', 'refused.queue_overflow'):
