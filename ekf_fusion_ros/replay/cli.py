@@ -37,15 +37,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as stop:
         return WRONG_ARGUMENTS if stop.code else DONE
     try:
-        options = _options(arguments)
-        _check_output(options.output)
-        replay(options)
+        replay(_options(arguments))
     except RecordingError as error:
         return _fail(str(error), UNUSABLE)
     except ValueError as error:
         return _fail(str(error), WRONG_ARGUMENTS)
     except OSError as error:
-        return _fail(f'{error.filename or options.output}: {error.strerror}', UNUSABLE)
+        return _fail(f'{error.filename or arguments.output}: {error.strerror}', UNUSABLE)
     return DONE
 
 
@@ -170,14 +168,6 @@ def _seconds(text: str) -> float:
     if not math.isfinite(value) or value < 0:
         raise argparse.ArgumentTypeError(f'{text} is not a number of seconds from 0 on')
     return value
-
-
-def _check_output(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ValueError(
-            f'--output {folder}: cannot be made a folder ({error.strerror})') from None
 
 
 if __name__ == '__main__':

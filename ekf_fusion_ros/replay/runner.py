@@ -109,7 +109,7 @@ class _Run:
     ) -> None:
         self.options = options
         self.progress = progress
-        options.output.mkdir(parents=True, exist_ok=True)
+        _make_folder(options)
         self._states = StateSink(options.output) if options.log_states else None
         self.session = FusionSession(
             options.params, roles, on_update=self._states.write if self._states else None)
@@ -149,6 +149,14 @@ class _Run:
         for line in lines:
             say(line)
         return summary
+
+
+def _make_folder(options: ReplayOptions) -> None:
+    try:
+        options.output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ValueError(
+            f'output {options.output}: cannot be made a folder ({error.strerror})') from None
 
 
 def _bag_steps(

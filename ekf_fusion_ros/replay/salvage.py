@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import dataclass
 from dataclasses import field
+import os
 from pathlib import Path
+import shutil
 import sqlite3
 import struct
-from typing import Any
+from tempfile import TemporaryDirectory
 import zlib
 
 from ekf_fusion_ros.replay.compression import zstd
@@ -165,25 +168,44 @@ def _decompressed(compression: str, data: bytes) -> bytes:
 def _salvage_db3(path: Path, wanted_types: Collection[str]) -> Salvage:
     """Read the rows one by one by their number, past the pages that are damaged."""
     found = Salvage()
-    try:
-        with sqlite3.connect(f'file:{path}?mode=ro&immutable=1', uri=True) as database:
-            # Lets sqlite open a file whose schema does not match its size.
-            database.execute('PRAGMA writable_schema=ON')
-            topics = {number: (name, kind) for number, name, kind in
-                      database.execute('SELECT id, name, type FROM topics')}
-            found.types = dict(topics.values())
-            wanted = {number: name for number, (name, kind) in topics.items()
-                      if kind in wanted_types}
-            lost = _rows(database, wanted, found)
-    except sqlite3.Error as error:
-        found.losses.append(f'the database cannot be read ({error})')
-        return found
-    if lost:
-        found.losses.append(f'{lost} rows cannot be read')
+    with TemporaryDirectory(prefix='ekf_fusion_ros_') as scratch:
+        try:
+            whole = _whole_pages(path, Path(scratch))
+            with closing(sqlite3.connect(f'file:{whole}?mode=ro&immutable=1', uri=True)) as base:
+                _read_db3(base, wanted_types, found)
+        except sqlite3.Error as error:
+            found.losses.append(f'the database cannot be read ({error})')
     return found
 
 
-def _rows(database: Any, wanted: dict[int, str], found: Salvage) -> int:
+def _whole_pages(path: Path, scratch: Path) -> Path:
+    """Return the file without the part of a page at its end, which would read as zeros."""
+    size = path.stat().st_size
+    with path.open('rb') as database:
+        head = database.read(18)
+    page, = struct.unpack('>H', head[16:18]) if len(head) == 18 else (0,)
+    page = 65536 if page == 1 else page
+    if page == 0 or size % page == 0:
+        return path
+    whole = scratch / path.name
+    shutil.copyfile(path, whole)
+    os.truncate(whole, size - size % page)
+    return whole
+
+
+def _read_db3(database: sqlite3.Connection, wanted_types: Collection[str], found: Salvage) -> None:
+    # Lets sqlite open a file whose schema does not match its size.
+    database.execute('PRAGMA writable_schema=ON')
+    topics = {number: (name, kind) for number, name, kind in
+              database.execute('SELECT id, name, type FROM topics')}
+    found.types = dict(topics.values())
+    wanted = {number: name for number, (name, kind) in topics.items() if kind in wanted_types}
+    lost = _rows(database, wanted, found)
+    if lost:
+        found.losses.append(f'{lost} rows cannot be read')
+
+
+def _rows(database: sqlite3.Connection, wanted: dict[int, str], found: Salvage) -> int:
     """Collect the rows of the wanted topics and return how many were lost."""
     lost = misses = number = 0
     while misses < MISSES_MAX:

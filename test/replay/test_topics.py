@@ -1,0 +1,75 @@
+"""Choice of topics: by type, by request, and what is said of the rest."""
+
+from __future__ import annotations
+
+import pytest
+
+storage = pytest.importorskip('ekf_fusion_ros.replay.storage')
+topics = pytest.importorskip('ekf_fusion_ros.replay.topics')
+
+ODOM, FIX, IMU = 'nav_msgs/msg/Odometry', 'sensor_msgs/msg/NavSatFix', 'sensor_msgs/msg/Imu'
+TWIST = 'geometry_msgs/msg/TwistWithCovarianceStamped'
+MAG = 'sensor_msgs/msg/MagneticField'
+
+
+def recording(*rows):
+    return {name: storage.Topic(name, kind, count) for name, kind, count in rows}
+
+
+def names(choice):
+    return {role: topic.name for role, topic in choice.topics.items()}
+
+
+def choose(available, **wanted):
+    return topics.choose(available, wanted, 'flight')
+
+
+def test_odometry_and_fix_leave_the_imu_out_and_say_so():
+    choice = choose(recording(('/imu', IMU, 900), ('/odom', ODOM, 90), ('/fix', FIX, 9)))
+    assert names(choice) == {'odometry': '/odom', 'fix': '/fix'}
+    assert any('--topic imu=/imu' in line for line in choice.lines())
+
+
+def test_without_odometry_the_autopilot_sensors_are_taken():
+    choice = choose(recording(
+        ('/imu', IMU, 900), ('/fix', FIX, 9), ('/fix_velocity', TWIST, 9), ('/mag', MAG, 90),
+        ('/cmd_vel', TWIST, 90), ('/camera', 'sensor_msgs/msg/Image', 5)))
+    assert names(choice) == {
+        'imu': '/imu', 'fix': '/fix', 'fix_velocity': '/fix_velocity', 'magnetic_field': '/mag'}
+    assert any('--topic fix_velocity=/cmd_vel' in line for line in choice.lines())
+    assert not any('/camera' in line for line in choice.lines())
+
+
+def test_asked_for_and_kept_out():
+    available = recording(('/imu', IMU, 900), ('/odom', ODOM, 90), ('/fix', FIX, 9))
+    assert names(choose(available, imu='/imu')) == {
+        'odometry': '/odom', 'fix': '/fix', 'imu': '/imu'}
+    assert names(choose(available, fix='')) == {'odometry': '/odom'}
+    assert names(choose(available, odometry='')) == {'fix': '/fix', 'imu': '/imu'}
+
+
+def test_of_several_the_choice_is_stable_and_said():
+    available = recording(
+        ('/b/odom', ODOM, 90), ('/a/odom', ODOM, 90), ('/odometry/filtered', ODOM, 900))
+    choice = choose(available)
+    assert names(choice) == {'odometry': '/a/odom'}
+    assert any('instead of /a/odom with --topic odometry=/b/odom' in line
+               for line in choice.lines())
+
+
+@pytest.mark.parametrize(('wanted', 'words'), [
+    ({'fix': '/nope'}, 'no topic /nope for role fix'),
+    ({'fix': '/imu'}, 'takes sensor_msgs/msg/NavSatFix'),
+    ({'odometry': '', 'imu': ''}, 'no inertial input'),
+    ({'fix': '', 'fix_velocity': '/vel'}, 'needs a fix'),
+])
+def test_what_cannot_be_chosen(wanted, words):
+    available = recording(
+        ('/imu', IMU, 900), ('/odom', ODOM, 90), ('/fix', FIX, 9), ('/vel', TWIST, 9))
+    with pytest.raises(storage.RecordingError, match=words):
+        choose(available, **wanted)
+
+
+def test_a_recording_of_nothing_useful():
+    with pytest.raises(storage.RecordingError, match='/camera'):
+        choose(recording(('/camera', 'sensor_msgs/msg/Image', 5)))

@@ -1,0 +1,75 @@
+"""Roles and the aiding they call for."""
+
+from __future__ import annotations
+
+import pytest
+
+from ekf_fusion_ros.params import Params
+from ekf_fusion_ros.params import with_overrides
+from ekf_fusion_ros.roles import configure
+
+
+def test_odometry_and_fix():
+    ekf2 = configure(Params(), ('odometry', 'fix')).ekf2
+    assert ekf2.gnss.enabled
+    assert ekf2.vision.use_velocity and ekf2.vision.rotate
+    assert not ekf2.vision.use_position and not ekf2.vision.use_yaw
+    assert ekf2.height.reference == 'gnss'
+    assert ekf2.mag.type == 'none'
+    assert ekf2.imu.inhibit_accel_bias
+
+
+def test_odometry_alone_is_absolute():
+    ekf2 = configure(Params(), ('odometry',)).ekf2
+    assert not ekf2.gnss.enabled
+    assert ekf2.vision.use_position and ekf2.vision.use_yaw and not ekf2.vision.rotate
+    assert ekf2.height.reference == 'vision'
+
+
+def test_autopilot_sensors_keep_the_defaults():
+    ekf2 = configure(Params(), ('imu', 'fix', 'fix_velocity', 'magnetic_field', 'pressure')).ekf2
+    assert ekf2.height.reference == 'baro'
+    assert ekf2.mag.type == 'auto'
+    assert not ekf2.imu.inhibit_accel_bias
+    assert not ekf2.vision.use_velocity
+
+
+def test_declared_north_is_used():
+    params = with_overrides(Params(), {'messages.odometry.true_heading': True})
+    vision = configure(params, ('odometry', 'fix')).ekf2.vision
+    assert vision.use_yaw and not vision.rotate
+
+
+def test_what_the_user_chose_wins():
+    params = with_overrides(
+        Params(), {'ekf2.height.reference': 'vision', 'ekf2.mag.type': 'indoor'})
+    ekf2 = configure(params, ('odometry', 'fix')).ekf2
+    assert ekf2.height.reference == 'vision'
+    assert ekf2.mag.type == 'indoor'
+
+
+def test_automatic_aiding_can_be_switched_off():
+    params = with_overrides(Params(), {'session.automatic_aiding': False})
+    assert configure(params, ('odometry', 'fix')) == params
+
+
+def test_horizon_lies_behind_delays_and_hold():
+    params = with_overrides(Params(), {'ekf2.gnss.delay_ms': 400})
+    ekf2 = configure(params, ('imu', 'fix')).ekf2
+    assert ekf2.timing.horizon_min_ms >= 400 + params.session.hold_ms
+
+
+def test_mounting_of_the_messages_becomes_the_lever_arm():
+    params = with_overrides(Params(), {'messages.fix.mount_xyz': '0.5, 0.2, 1.0'})
+    assert configure(params, ('imu', 'fix')).ekf2.gnss.position == (0.5, -0.2, -1.0)
+
+
+@pytest.mark.parametrize(('roles', 'word'), [
+    (('fix',), 'no inertial input'),
+    (('imu', 'fix_velocity'), 'needs a fix'),
+    (('imu', 'flow'), 'not supported'),
+    (('imu', 'gyroscope'), 'unknown role'),
+])
+def test_roles_that_cannot_be_fused(roles, word):
+    with pytest.raises(ValueError, match=word):
+        configure(Params(), roles)
