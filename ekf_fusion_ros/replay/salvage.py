@@ -4,23 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from collections.abc import Iterator
-from contextlib import closing
 from dataclasses import dataclass
 from dataclasses import field
-import os
 from pathlib import Path
-import shutil
-import sqlite3
 import struct
-from tempfile import TemporaryDirectory
+from typing import Any
 import zlib
 
 from ekf_fusion_ros.replay.compression import zstd
+from ekf_fusion_ros.replay.sqlite_pages import leaf_rows
 
 MCAP_MAGIC = b'\x89MCAP0\r\n'
 SCHEMA, CHANNEL, MESSAGE, CHUNK, CHUNK_INDEX, FOOTER = 3, 4, 5, 6, 8, 2
 LAST_OPCODE = 15
-MISSES_MAX = 5000
 
 
 @dataclass(slots=True)
@@ -166,60 +162,32 @@ def _decompressed(compression: str, data: bytes) -> bytes:
 
 
 def _salvage_db3(path: Path, wanted_types: Collection[str]) -> Salvage:
-    """Read the rows one by one by their number, past the pages that are damaged."""
+    """Collect the rows that look like those of the tables `topics` and `messages`."""
     found = Salvage()
-    with TemporaryDirectory(prefix='ekf_fusion_ros_') as scratch:
-        try:
-            whole = _whole_pages(path, Path(scratch))
-            with closing(sqlite3.connect(f'file:{whole}?mode=ro&immutable=1', uri=True)) as base:
-                _read_db3(base, wanted_types, found)
-        except sqlite3.Error as error:
-            found.losses.append(f'the database cannot be read ({error})')
+    topics: dict[int, str] = {}
+    messages: dict[int, tuple[int, int, bytes]] = {}
+    for row, columns in leaf_rows(path):
+        if _is_topic(columns):
+            topics[row] = columns[1]
+            found.types[columns[1]] = columns[2]
+        elif _is_message(columns):
+            messages.setdefault(row, (columns[2], columns[1], columns[3]))
+    for _, (time_ns, topic, data) in sorted(messages.items()):
+        if found.types.get(topics.get(topic, '')) in wanted_types:
+            found.messages.append((time_ns, topics[topic], data))
+    lost = max(messages, default=0) - len(messages)
+    if lost:
+        found.losses.append(f'{lost} rows cannot be read')
+    if not found.types:
+        found.losses.append('it holds no table of topics')
     return found
 
 
-def _whole_pages(path: Path, scratch: Path) -> Path:
-    """Return the file without the part of a page at its end, which would read as zeros."""
-    size = path.stat().st_size
-    with path.open('rb') as database:
-        head = database.read(18)
-    page, = struct.unpack('>H', head[16:18]) if len(head) == 18 else (0,)
-    page = 65536 if page == 1 else page
-    if page == 0 or size % page == 0:
-        return path
-    whole = scratch / path.name
-    shutil.copyfile(path, whole)
-    os.truncate(whole, size - size % page)
-    return whole
+def _is_topic(columns: list[Any]) -> bool:
+    return (len(columns) >= 4 and isinstance(columns[1], str) and isinstance(columns[2], str)
+            and '/' in columns[2])
 
 
-def _read_db3(database: sqlite3.Connection, wanted_types: Collection[str], found: Salvage) -> None:
-    # Lets sqlite open a file whose schema does not match its size.
-    database.execute('PRAGMA writable_schema=ON')
-    topics = {number: (name, kind) for number, name, kind in
-              database.execute('SELECT id, name, type FROM topics')}
-    found.types = dict(topics.values())
-    wanted = {number: name for number, (name, kind) in topics.items() if kind in wanted_types}
-    lost = _rows(database, wanted, found)
-    if lost:
-        found.losses.append(f'{lost} rows cannot be read')
-
-
-def _rows(database: sqlite3.Connection, wanted: dict[int, str], found: Salvage) -> int:
-    """Collect the rows of the wanted topics and return how many were lost."""
-    lost = misses = number = 0
-    while misses < MISSES_MAX:
-        number += 1
-        try:
-            row = database.execute(
-                'SELECT topic_id, timestamp, data FROM messages WHERE id = ?', (number,)
-            ).fetchone()
-        except sqlite3.Error:
-            row = None
-        if row is None:
-            misses += 1
-            continue
-        lost, misses = lost + misses, 0
-        if row[0] in wanted and isinstance(row[2], bytes):
-            found.messages.append((row[1], wanted[row[0]], row[2]))
-    return lost
+def _is_message(columns: list[Any]) -> bool:
+    return (len(columns) == 4 and isinstance(columns[1], int) and isinstance(columns[2], int)
+            and isinstance(columns[3], bytes))
