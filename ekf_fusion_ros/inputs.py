@@ -82,10 +82,6 @@ class InertialInput:
         samples: list[ImuSample] = self._odometry.push(reading)
         return samples
 
-    def fused(self) -> VisionSample | None:
-        """Return the newest odometry as it should be fused beside its own increments."""
-        return None if self._odometry is None else self._odometry.fused()
-
     def fused(self, reading: VisionSample) -> VisionSample:
         """Return the odometry sample that was just pushed as the estimator should fuse it."""
         if self._odometry is None:

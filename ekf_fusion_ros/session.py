@@ -373,7 +373,7 @@ class FusionSession:
                         + (f' ({reasons})' if reasons else ''))
         nav = self._estimator.nav_state()
         aligned = nav is not None and nav.yaw_aligned
-        return '' if aligned or self._motion is None else self._motion.status()
+        return '' if aligned or self._motion is None else self._motion.status().text
 
     def _collect(self) -> None:
         self._events += self._estimator.drain_events()
