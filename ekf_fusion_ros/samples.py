@@ -116,6 +116,11 @@ class VisionSample:
         return math.isfinite(self.position[0])
 
     @property
+    def has_attitude(self) -> bool:
+        """True where an attitude was measured."""
+        return math.isfinite(self.quaternion[0])
+
+    @property
     def has_velocity(self) -> bool:
         """True where a horizontal velocity was measured."""
         return math.isfinite(self.velocity[0])

@@ -52,6 +52,8 @@ class Covariance:
         self._field_noise = ((dt * mag.earth_process_noise) ** 2,
                              (dt * mag.body_process_noise) ** 2)
         self._wind_noise = dt * params.aiding.wind_process_noise
+        self._position_drift_var = dt * params.aiding.position_drift ** 2
+        self._yaw_drift_var = dt * params.aiding.yaw_drift ** 2
 
     def predict(
         self, x: Array, imu: Array, dt_avg: float, bad_accel: bool,
@@ -77,8 +79,12 @@ class Covariance:
                 noise[19:22] = body
         if self.wind_active and p[22, 22] + p[23, 23] < WIND_LEARNED_VARIANCE:
             noise[22:24] = (self._wind_noise * (1.0 + 0.5 * abs(climb_rate))) ** 2
+        if self._position_drift_var > 0.0:
+            noise[7:9] = self._position_drift_var * math.hypot(x[4], x[5])
         predict_covariance(p, self._transition, self._angle_var, velocity_var, noise,
                            self.inhibited, self._saved, self.mag_active, self.wind_active)
+        if self._yaw_drift_var > 0.0:
+            self.add_yaw_variance(x[0:4], self._yaw_drift_var)
         self._limit()
 
     def inhibit_accel_bias(self, axis: int, inhibit: bool) -> None:

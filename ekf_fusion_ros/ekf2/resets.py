@@ -166,7 +166,7 @@ class Resets:
             self.position_to_fix()
         elif f.flags.ev_pos and f.vision is not None and f.vision.has_position:
             f.events.add(f.t_now, EventKind.POS_RESET_VISION)
-            position = f.vision.position
+            position = np.nan_to_num(f.vision.position)
             if f.params.vision.rotate:
                 position = f.rot_ev @ position
             self.horizontal_position(position, f.vision.position_var)

@@ -38,15 +38,14 @@ class YawRecovery:
         self._requested = True
         self._last_reset_us = 0
 
-    def align_without_gnss(self, gnss_healthy: bool) -> None:
-        """Serve a pending request while GNSS waits for a yaw."""
+    def align_without_gnss(self) -> None:
+        """Serve a pending request while GNSS waits for a yaw; its start then resets the rest."""
         f = self._f
         if f.flags.yaw_align:
-            # aligned by other means: the request is served
             self._requested = False
+        if not self._requested or not f.late(self._last_reset_us, RETRY_US):
             return
-        if self._requested and f.late(self._last_reset_us, RETRY_US) and self._reset(
-                gnss_healthy):
+        if self._turn_to_bank():
             self._last_reset_us = f.t_now
             self._requested = False
 
@@ -58,7 +57,9 @@ class YawRecovery:
         may_retry = self._count < MAX_RESETS and f.late(self._last_reset_us, RETRY_US)
         if not may_retry or f.late(previous_fix_us, FIX_GAP_US):
             return False
-        if self._reset(gnss_healthy):
+        if self._turn_to_bank():
+            self._resets.velocity_to_aiding(gnss_healthy)
+            self._resets.position_to_aiding()
             self._last_reset_us = f.t_now
             self._count += 1
             times = f.times
@@ -92,14 +93,12 @@ class YawRecovery:
         dot = float(observed[0] * f.x[4] + observed[1] * f.x[5])
         return dot < 0.0 or dot * dot < COURSE_ERROR_COS2 * speed2 * own2
 
-    def _reset(self, gnss_healthy: bool) -> bool:
+    def _turn_to_bank(self) -> bool:
+        """Take over the yaw of the bank; False while it is not certain enough."""
         f = self._f
-        variance = self._bank.variance
-        if not self._bank.running or not variance < YAW_SIGMA_MAX ** 2:
+        if not self._bank.running or not self._bank.variance < YAW_SIGMA_MAX ** 2:
             return False
-        self._resets.yaw(self._bank.yaw, variance)
-        self._resets.velocity_to_aiding(gnss_healthy)
-        self._resets.position_to_aiding()
+        self._resets.yaw(self._bank.yaw, self._bank.variance)
         f.flags.yaw_align = True
         if f.params.mag.type == 'none':
             f.events.add(f.t_now, EventKind.YAW_ALIGNED_IMU_GPS)

@@ -127,8 +127,9 @@ def predict_covariance(
 
     p (24, 24); f (10, 24) from fill_transition; angle_var rad^2 and velocity_var (3,) (m/s)^2 of the
     increments; noise (24,) the additive process noise. inhibited (3,) marks accelerometer axes whose
-    bias is not estimated: their rows stay zero with the saved (3,) variance. Inactive magnetic
-    and wind blocks are zero.
+    bias is not estimated: they keep the saved (3,) variance and no correlation with states 0 to 15
+    (that with field and wind survives, as in the reference filter). Inactive magnetic and wind
+    blocks are zero.
     """
     if not mag_active:
         noise[16:22] = 0.0
@@ -163,6 +164,6 @@ def predict_covariance(
         p[i, i] += noise[i]
     for k in range(3):
         if inhibited[k] != 0.0:
-            p[13 + k, :] = 0.0
-            p[:, 13 + k] = 0.0
+            p[13 + k, 0:16] = 0.0
+            p[0:16, 13 + k] = 0.0
             p[13 + k, 13 + k] = saved[k]

@@ -129,12 +129,11 @@ class Gnss:
         if not popped:
             self._watch_silence()
             return
-        self._start_or_stop()
         if not f.flags.gps:
-            self._recovery.align_without_gnss(self._checks.healthy)
-        else:
-            self._recover_or_reset()
+            self._recovery.align_without_gnss()
+        self._start_or_stop()
         if f.flags.gps:
+            self._recover_or_reset()
             self._remove_lever_arm()
             self._fuse()
 
@@ -249,10 +248,20 @@ class Gnss:
                                      (noise, noise), params.vel_gate)
             fuse_vertical_velocity(f, f.observations.gps_ver_vel, velocity_innovation[2],
                                    noise * VERTICAL_NOISE_RATIO ** 2, params.vel_gate)
-        noise = self._position_sigma(fix.hacc) ** 2
+        noise = self._position_sigma(fix.hacc) ** 2 * self._repetition(fix.time_us)
         fuse_horizontal_position(f, f.observations.gps_hor_pos, position_innovation,
                                  (noise, noise), params.pos_gate,
                                  relative=f.position_is_relative)
+
+    def _repetition(self, time_us: int) -> float:
+        """Return how many fixes tell as much as one whose errors are independent.
+
+        White noise of variance s^2 n at interval T has at low frequency the power of a first-order
+        Markov process of variance s^2 and time constant tau where n = 2 tau / T.
+        """
+        tau = self._f.params.gnss.correlation_time
+        interval = max(time_us - self._previous_fix_us, 1) / SECOND
+        return max(1.0, 2.0 * tau / interval)
 
     def _position_sigma(self, hacc: float) -> float:
         """Bound the claimed accuracy; a sole source may not be distrusted without limit."""

@@ -103,7 +103,7 @@ class Magnetometer:
         no_other_yaw = not flags.ev_yaw and not flags.gps_yaw
         if f.params.mag.type == 'none' or flags.mag_fault or not flags.tilt_align:
             self.stop()
-            if no_other_yaw:
+            if no_other_yaw and (f.params.aiding.hold_yaw or not flags.yaw_align):
                 self._heading.hold(None, PSEUDO_YAW_NOISE)
             return
         other_yaw_ended = no_other_yaw and self._other_yaw_before

@@ -79,7 +79,8 @@ class Vision:
         assert sample is not None
         if yaw_forbidden:
             flags.ev_yaw = False
-        if params.rotate and (params.use_position or params.use_velocity) and not flags.ev_yaw:
+        rotates = params.rotate and (params.use_position or params.use_velocity)
+        if rotates and not flags.ev_yaw and sample.has_attitude:
             f.rot_ev = rotation_to_filter_frame(f.x[0:4], sample.quaternion)
             self.heading.step(sample)
         recent = f.recent(self.last_arrival_us, RECENT_US)
@@ -88,7 +89,8 @@ class Vision:
                 self.position.start()
             if params.use_velocity and not flags.ev_vel and sample.has_velocity:
                 self.velocity.start(gnss_healthy)
-        may_start_yaw = params.use_yaw and not yaw_forbidden and flags.tilt_align
+        may_start_yaw = (params.use_yaw and not yaw_forbidden and flags.tilt_align
+                         and sample.has_attitude)
         if may_start_yaw and recent and not flags.ev_yaw:
             self.yaw.start(sample)
         if flags.ev_pos and sample.has_position:
@@ -97,7 +99,7 @@ class Vision:
             self.position.fuse(sample, gnss_healthy)
         if flags.ev_vel and sample.has_velocity:
             self.velocity.fuse(sample, gnss_healthy)
-        if flags.ev_yaw:
+        if flags.ev_yaw and sample.has_attitude:
             self.yaw.fuse(sample)
 
     def _at_imu(self, sample: VisionSample) -> VisionSample:

@@ -55,7 +55,8 @@ class VisionPosition:
 
     def _fuse_absolute(self, sample: VisionSample, gnss_healthy: bool) -> None:
         f = self._f
-        position, covariance = sample.position, np.diag(sample.position_var)
+        position = np.nan_to_num(sample.position)
+        covariance = np.diag(np.nan_to_num(sample.position_var))
         f.position_is_relative = False
         if f.params.vision.rotate:
             position = f.rot_ev @ position
@@ -89,8 +90,9 @@ class VisionPosition:
         if previous is None or jumped or sample.time_us <= previous.time_us:
             return
         interval = 1e-6 * (sample.time_us - previous.time_us)
-        moved = (f.rot_ev @ (sample.position - previous.position))[0:2]
-        spread = np.diag(sample.position_var + previous.position_var)
+        # an unmeasured height must not reach x and y through the rotation
+        moved = (f.rot_ev @ np.nan_to_num(sample.position - previous.position))[0:2]
+        spread = np.diag(np.nan_to_num(sample.position_var + previous.position_var))
         noise = np.diag(f.rot_ev @ spread @ f.rot_ev.T)[0:2] / interval ** 2
         fuse_horizontal_velocity(f, f.observations.ev_hor_pos,
                                  ((travelled - moved) / interval).tolist(),
