@@ -79,9 +79,24 @@ def _wanted(params: Params, roles: Collection[str]) -> dict[str, dict[str, Any]]
             'delay_ms': params.session.odometry_delay_ms,
         }
     if IMU not in roles:
-        # The odometry's velocity increments carry no accelerometer bias.
-        wanted['imu'] = {'inhibit_accel_bias': True}
+        _add_odometry_as_imu(wanted)
     return wanted
+
+
+def _add_odometry_as_imu(wanted: dict[str, dict[str, Any]]) -> None:
+    """Add the noise of increments that come from odometry.
+
+    They have no accelerometer bias and hardly a gyro bias, but drift in yaw, scale and slip. Fixes
+    err by metres over tens of seconds, which against such a smooth input must not pass for news.
+    """
+    wanted['imu'] = {
+        'inhibit_accel_bias': True,
+        'gyro_noise': 0.005,
+        'switch_on_gyro_bias': 0.001,
+        'gyro_bias_process_noise': 1e-5,
+    }
+    wanted['aiding'] = {'position_drift': 1.0, 'yaw_drift': 0.005, 'hold_yaw': False}
+    wanted['gnss']['correlation_time'] = 3.0
 
 
 def _horizon_ms(params: Params) -> float:
