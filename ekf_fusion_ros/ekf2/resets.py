@@ -26,6 +26,8 @@ YAW_VARIANCE_MAX = 0.01
 UNKNOWN_VELOCITY_VARIANCE = 25.0
 UNKNOWN_CLIMB_VARIANCE = 10.0
 
+DIFFUSE = 100.0
+
 
 class ResetCounters:
     """How often each part of the state has jumped, and by how much the last time."""
@@ -144,6 +146,9 @@ class Resets:
             f.events.add(f.t_now, EventKind.VEL_RESET_VISION)
             velocity, covariance = vision_velocity_in_filter_frame(f, f.vision)
             variance = np.diag(covariance)
+            if f.params.vision.velocity_tells_attitude:
+                # Its direction hangs on the attitude; the fusion that follows makes that known.
+                variance = variance + DIFFUSE * (1.0 + float(velocity @ velocity))
             self.horizontal_velocity(velocity, variance)
             self.vertical_velocity(float(velocity[2]), float(variance[2]))
         else:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from ekf_fusion_ros.ekf2.covariance import rotation_vector_variances
 from ekf_fusion_ros.ekf2.events import EventKind
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.resets import Resets
@@ -36,7 +37,12 @@ class VisionHeading:
             return
         self._waiting = None
         turn = wrap_pi(sample.yaw - yaw_321(f.rot_ev))
-        self._resets.yaw(wrap_pi(yaw_of(f.rot) + turn), sample.variance, variance_max=math.inf)
+        variances = rotation_vector_variances(f.x[0:4], f.cov.p)
+        self._resets.yaw(wrap_pi(yaw_of(f.rot) + turn), 0.0)
+        variances[2] = sample.variance
+        f.cov.set_attitude(f.x[0:4], variances)
+        if f.flags.ev_vel:
+            self._resets.velocity_to_aiding(False)
         f.rot_ev = rotation_to_filter_frame(f.x[0:4], vision.quaternion)
         f.flags.yaw_align = True
         f.events.add(f.t_now, EventKind.YAW_ALIGNED_MOTION,
