@@ -18,6 +18,11 @@ class OdometryHeading:
         self._time_us = 0
         self._yaw = math.nan
 
+    @property
+    def known(self) -> bool:
+        """True once an odometry sample has come."""
+        return self._time_us > 0
+
     def push(self, sample: VisionSample) -> None:
         """Note the attitude of an odometry sample; without one its axes are the body's."""
         measured = math.isfinite(sample.quaternion[0])

@@ -332,7 +332,9 @@ class FusionSession:
 
         None without odometry or fix, and before the yaw is aligned.
         """
-        nav = None if self._local else self._estimator.nav_state()
+        if self._local or not self._heading.known:
+            return None
+        nav = self._estimator.nav_state()
         if nav is None or not nav.yaw_aligned:
             return None
         return self._heading.estimate(nav)

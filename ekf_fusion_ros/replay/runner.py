@@ -12,8 +12,6 @@ from dataclasses import replace
 import time
 from typing import Any
 
-from rosbags.typesys import Stores
-from rosbags.typesys import get_typestore
 from tqdm import tqdm
 
 from ekf_fusion_ros.estimator import Event
@@ -21,6 +19,7 @@ from ekf_fusion_ros.fused_output import FusedOutput
 from ekf_fusion_ros.inputs import ROLE_OF_SAMPLE
 from ekf_fusion_ros.messages.stamps import microseconds
 from ekf_fusion_ros.params import Params
+from ekf_fusion_ros.replay.cdr_reader import reader_of
 from ekf_fusion_ros.replay.options import ReplayOptions
 from ekf_fusion_ros.replay.sinks import AlignmentSink
 from ekf_fusion_ros.replay.sinks import BagSink
@@ -164,8 +163,8 @@ def _bag_steps(
 ) -> Iterator[list[FusedOutput]]:
     """Hand the messages to the session, yielding what is due after each."""
     session, withholding, options = run.session, run.withholding, run.options
-    store = get_typestore(Stores.ROS2_JAZZY)
-    roles = {topic.name: (role, topic.type) for role, topic in choice.topics.items()}
+    roles = {topic.name: (role, topic.type, reader_of(topic.type))
+             for role, topic in choice.topics.items()}
     first_ns = recording.start_ns + round(1e9 * options.start)
     last_ns = None if options.end is None else recording.start_ns + round(1e9 * options.end)
     total = sum(topic.count for topic in choice.topics.values())
@@ -174,9 +173,9 @@ def _bag_steps(
             continue
         if last_ns is not None and time_ns >= last_ns:
             break
-        role, kind = roles[name]
+        role, kind, read = roles[name]
         try:
-            message = store.deserialize_cdr(data, kind)
+            message = read(data)
         except Exception as error:
             # Damaged bytes can make the decoder raise anything.
             session.refuse(role, 'undecodable', f'{len(data)} bytes are no {kind} ({error})')
