@@ -16,6 +16,11 @@ from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import HealthLevel
 from ekf_fusion_ros.statistics import RoleStatistics
 
+TROUBLE = {
+    'internal_errors': 'internal errors, see the log',
+    'stalls': 'times busy for long, inputs may be lost: is the computer overloaded?',
+}
+
 
 @dataclass(frozen=True, slots=True)
 class Report:
@@ -27,14 +32,21 @@ class Report:
     values: Mapping[str, str] = field(default_factory=dict)
 
 
-def estimator_report(health: Health, trouble: Mapping[str, int]) -> Report:
-    """Report the estimator; `trouble` counts by name what went wrong in the node itself."""
-    values = {**health.values, **{name: str(count) for name, count in trouble.items()}}
-    found = [f'{count} {name.replace("_", " ")}' for name, count in trouble.items() if count]
-    if not found:
-        return Report('estimator', health.level, health.text, values)
-    text = f'{health.text}; in the node: {", ".join(found)}'
-    return Report('estimator', max(health.level, HealthLevel.WARN), text, values)
+class EstimatorWatch:
+    """Reports the estimator, and what went wrong in the node itself since the last report."""
+
+    def __init__(self) -> None:
+        self._trouble: Mapping[str, int] = {}
+
+    def report(self, health: Health, trouble: Mapping[str, int], queued: int) -> Report:
+        """Report health; `trouble` counts by name, `queued` messages wait for the filter."""
+        values = {**health.values, 'queued': str(queued)}
+        values.update({name: str(count) for name, count in trouble.items()})
+        new = {name: count - self._trouble.get(name, 0) for name, count in trouble.items()}
+        self._trouble = dict(trouble)
+        words = [f'{count} {TROUBLE[name]}' for name, count in new.items() if count]
+        level = max(health.level, HealthLevel.WARN) if words else health.level
+        return Report('estimator', level, '; '.join([health.text, *words]), values)
 
 
 class TopicWatch:

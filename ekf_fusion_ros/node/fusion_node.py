@@ -31,15 +31,17 @@ from sensor_msgs.msg import Imu
 from sensor_msgs.msg import MagneticField
 from sensor_msgs.msg import NavSatFix
 
+from ekf_fusion_ros.kernels.compile import COMPILED
 from ekf_fusion_ros.node.diagnostics import DiagnosticsPublisher
+from ekf_fusion_ros.node.diagnostics import EstimatorWatch
 from ekf_fusion_ros.node.diagnostics import TopicWatch
-from ekf_fusion_ros.node.diagnostics import estimator_report
 from ekf_fusion_ros.node.intake import Intake
 from ekf_fusion_ros.node.parameters import declare_parameters
 from ekf_fusion_ros.node.publishers import Publishers
 from ekf_fusion_ros.node.qos import input_qos
 from ekf_fusion_ros.params.tree import Params
 from ekf_fusion_ros.session import FusionSession
+from ekf_fusion_ros.warm_up import warm_up
 
 TOPICS = {
     'odometry': ('odom', Odometry),
@@ -65,15 +67,29 @@ class FusionNode(Node):  # type: ignore[misc]
         self._intake = Intake(self._params.node.queue_limit)
         self._outputs = Publishers(self, self._params)
         self._diagnostics = DiagnosticsPublisher(self)
+        self._estimator_watch = EstimatorWatch()
         self._watches: dict[str, TopicWatch] = {}
-        self._trouble = Counter({'internal_errors': 0, 'stalls': 0})
+        self._trouble = Counter(internal_errors=0, stalls=0)
         self._told: set[str] = set()
         self._last_run: float | None = None
+
+    def prepare(self, stopped: Callable[[], bool]) -> None:
+        """Make the kernels ready while nothing arrives; ends early once `stopped` says so."""
+        if COMPILED:
+            self.get_logger().info('preparing compiled kernels; the first time takes a minute')
+        try:
+            warm_up(self._session.params, stopped)
+        except Exception as error:  # the filter may still do with what really comes
+            self._tell_error('preparing the kernels', error)
 
     def start(self) -> None:
         """Subscribe and start the timers."""
         for role in self._params.node.roles:
             self._subscribe(role)
+        unused = [role for role in TOPICS if role not in self._params.node.roles]
+        if unused:
+            self.get_logger().info(
+                f'not listening to {", ".join(unused)}: set node.use_<name> to true to do so')
         # Not the ROS clock: the filter runs on stamps, also while /clock stands still.
         clock = Clock(clock_type=ClockType.STEADY_TIME)
         node = self._params.node
@@ -100,15 +116,16 @@ class FusionNode(Node):  # type: ignore[misc]
     def _run_core(self) -> None:
         """Feed the session for one period at most, so that messages go on being queued."""
         started = time.monotonic()
-        if self._last_run is not None and started - self._last_run > STALL_S:
+        period = 1.0 / self._params.node.core_rate
+        if self._last_run is not None and started - self._last_run > period + STALL_S:
             # The queues of DDS are short and overwrite without a word: say that it may be so.
             self._trouble['stalls'] += 1
-        deadline = started + 1.0 / self._params.node.core_rate
+        self._last_run = started
+        deadline = started + period
         while self._intake and time.monotonic() < deadline:
             self._handle(*self._intake.take())
         for event in self._session.drain_events():
             self.get_logger().info(f'{event.time_us / 1e6:.3f} s: {event.text}')
-        self._last_run = time.monotonic()
 
     def _handle(self, role: str, message: Any) -> None:
         try:
@@ -119,7 +136,8 @@ class FusionNode(Node):  # type: ignore[misc]
 
     def _report(self) -> None:
         counts = self._session.statistics()
-        reports = [estimator_report(self._session.health(), self._trouble)]
+        reports = [self._estimator_watch.report(
+            self._session.health(), self._trouble, len(self._intake))]
         reports += [watch.report(counts[role]) for role, watch in self._watches.items()]
         self._diagnostics.publish(reports)
 
@@ -183,7 +201,9 @@ class StopRequest:
 
 
 def spin(node: FusionNode, stop: StopRequest) -> None:
-    """Serve a node until it is asked to stop or ROS shuts down."""
+    """Start a node and serve it until it is asked to stop or ROS shuts down."""
+    node.prepare(lambda: stop.made)
+    node.start()
     executor = make_executor()
     executor.add_node(node)
     # EventsExecutor.spin() of rclpy 7.1 serves nothing; spin_once() does.
@@ -194,7 +214,7 @@ def spin(node: FusionNode, stop: StopRequest) -> None:
 
 
 def make_node(arguments: Sequence[str]) -> FusionNode:
-    """Return a started node. Raises ValueError, in one sentence, for unusable arguments."""
+    """Return a node. Raises ValueError, in one sentence, for unusable arguments."""
     parser = argparse.ArgumentParser(
         'fuser', description=__doc__, epilog='ROS arguments follow --ros-args.')
     command = ['fuser', *arguments]
@@ -203,9 +223,7 @@ def make_node(arguments: Sequence[str]) -> FusionNode:
         rclpy.init(args=command, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
         raise ValueError(f'unusable ROS arguments: {" ".join(str(error).split())}') from error
-    node = FusionNode()
-    node.start()
-    return node
+    return FusionNode()
 
 
 def main(argv: Sequence[str] | None = None) -> int:

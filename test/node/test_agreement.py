@@ -129,7 +129,8 @@ def rows_of_node(
         peer.publish(play.topics[role], raw)
         sent[role] += 1
     peer.until(lambda: in_flight(sent, peer) == 0, fuser)
-    peer.until(lambda: bool(peer.odometry) and stamp_us(peer.odometry[-1]) >= last_us, fuser)
+    for heard in (peer.odometry, peer.fixes):
+        peer.until(lambda heard=heard: bool(heard) and stamp_us(heard[-1]) >= last_us, fuser)
     return peer.odometry
 
 
@@ -138,7 +139,7 @@ def in_flight(sent: Counter[str], peer: Peer) -> int:
     return sum(sent.values()) - sum(peer.count(role) for role in sent)
 
 
-def stamp_us(message: Odometry) -> int:
+def stamp_us(message: Odometry | NavSatFix) -> int:
     """Return a header stamp, which the node gives in whole microseconds."""
     stamp = message.header.stamp
     assert stamp.nanosec % 1000 == 0

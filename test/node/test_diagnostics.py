@@ -8,8 +8,8 @@ pytest.importorskip('rclpy')
 
 from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import HealthLevel
+from ekf_fusion_ros.node.diagnostics import EstimatorWatch
 from ekf_fusion_ros.node.diagnostics import TopicWatch
-from ekf_fusion_ros.node.diagnostics import estimator_report
 from ekf_fusion_ros.statistics import RoleStatistics
 
 
@@ -46,15 +46,24 @@ def test_level_follows_what_is_new() -> None:
     assert 'none since the last report' in silent.text
 
 
-def test_trouble_of_the_node_raises_the_level() -> None:
+def test_trouble_of_the_node_raises_the_level_once() -> None:
+    watch = EstimatorWatch()
     health = Health(HealthLevel.OK, 'ok: gnss position', {'horizon': '0.2'})
-    assert estimator_report(health, {'stalls': 0}).level == HealthLevel.OK
-    troubled = estimator_report(health, {'internal_errors': 2, 'stalls': 0})
+    trouble = {'internal_errors': 0, 'stalls': 0}
+    assert watch.report(health, trouble, 0).level == HealthLevel.OK
+    trouble['internal_errors'] = 2
+    troubled = watch.report(health, trouble, 7)
     assert troubled.level == HealthLevel.WARN
-    assert troubled.text == 'ok: gnss position; in the node: 2 internal errors'
-    assert troubled.values == {'horizon': '0.2', 'internal_errors': '2', 'stalls': '0'}
+    assert troubled.text == 'ok: gnss position; 2 internal errors, see the log'
+    assert troubled.values == {
+        'horizon': '0.2', 'queued': '7', 'internal_errors': '2', 'stalls': '0'}
+    after = watch.report(health, trouble, 0)
+    assert (after.level, after.text) == (HealthLevel.OK, 'ok: gnss position')
+    assert after.values['internal_errors'] == '2'
 
 
 def test_trouble_does_not_hide_an_error() -> None:
     health = Health(HealthLevel.ERROR, 'filter fault', {})
-    assert estimator_report(health, {'stalls': 1}).level == HealthLevel.ERROR
+    report = EstimatorWatch().report(health, {'stalls': 1}, 0)
+    assert report.level == HealthLevel.ERROR
+    assert report.text.startswith('filter fault; 1 times busy')

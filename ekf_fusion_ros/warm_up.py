@@ -1,0 +1,79 @@
+"""Loads or compiles the kernels before the first message needs them.
+
+Compiling takes most of a minute the first time, loading what was compiled takes seconds: longer
+than the queues of a running system hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Iterator
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ekf_fusion_ros.inputs import make_estimator
+from ekf_fusion_ros.inputs import make_odometry_imu
+from ekf_fusion_ros.kernels.compile import COMPILED
+from ekf_fusion_ros.samples import BaroSample
+from ekf_fusion_ros.samples import GnssSample
+from ekf_fusion_ros.samples import HeadingSample
+from ekf_fusion_ros.samples import ImuSample
+from ekf_fusion_ros.samples import LandedSample
+from ekf_fusion_ros.samples import MagSample
+from ekf_fusion_ros.samples import Sample
+from ekf_fusion_ros.samples import VisionSample
+
+if TYPE_CHECKING:
+    from ekf_fusion_ros.params.tree import Params
+
+STEP_US = 10_000
+STEPS = 1800
+SPEED = 3.0
+METRES_PER_DEGREE = 111_195.0
+UP = np.array([0.0, 0.0, -1.0])
+NORTH = np.array([1.0, 0.0, 0.0])
+FIELD = np.array([0.21, 0.0, 0.43])
+LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def warm_up(params: Params, stopped: Callable[[], bool] = lambda: False) -> None:
+    """Run an estimator on a made-up flight so that its kernels are ready.
+
+    `stopped` is asked before every sample; True ends the work. Nothing is done without numba.
+    """
+    if not COMPILED:
+        return
+    estimator = make_estimator(params)
+    odometry_imu = make_odometry_imu(params)
+    for sample in climb():
+        if stopped():
+            return
+        if isinstance(sample, VisionSample):
+            odometry_imu.push(sample)
+        estimator.push(sample)
+        if isinstance(sample, ImuSample):
+            estimator.update()
+            estimator.nav_state()
+
+
+def climb() -> Iterator[Sample]:
+    """Yield the samples of a steady climb to the north: every sensor, inertial ones last."""
+    yield LandedSample(STEP_US, landed=False)
+    for number in range(1, STEPS):
+        time_us = number * STEP_US
+        way = SPEED * time_us * 1e-6
+        if number % 5 == 0:
+            yield MagSample(time_us, FIELD)
+            yield BaroSample(time_us, 100.0 + way)
+        if number % 4 == 0:
+            yield VisionSample(time_us, way * (NORTH + UP), LEVEL, SPEED * (NORTH + UP))
+        if number % 20 == 0:
+            yield GnssSample(
+                time_us, 47.0 + way / METRES_PER_DEGREE, 8.0, 100.0 + way, 0.5, 0.8,
+                SPEED * (NORTH + UP), 0.2)
+        if number % 600 == 0:
+            yield HeadingSample(time_us, 0.0, math.radians(3.0) ** 2)
+        dt = STEP_US * 1e-6
+        yield ImuSample(time_us, np.zeros(3), 9.80665 * dt * UP, dt, dt)
