@@ -45,11 +45,12 @@ class Control:
         self.height = Height(f, self.resets, self.baro, self.gnss, self.checks, self.vision)
         self.fake_position = FakePosition(f, self.resets)
         self.validity = Validity(f)
+        self._active_before: tuple[bool, ...] = ()
 
     def step(self) -> None:
         """Run every source once, then terrain and the yaw bank."""
         f = self._f
-        f.previous_flags.copy_from(f.flags)
+        f.gps_hgt_before = f.flags.gps_hgt
         if not f.flags.tilt_align:
             self._check_tilt()
         yaw_was_aligned = f.flags.yaw_align
@@ -100,22 +101,23 @@ class Control:
     def _note_activity(self) -> None:
         """Count starts and stops of each observation."""
         f = self._f
-        flags, previous, seen = f.flags, f.previous_flags, f.observations
-        if flags == previous and f.holding_position == self._was_holding:
+        flags, seen = f.flags, f.observations
+        active = (flags.gps, flags.gps_hgt, flags.ev_pos, flags.ev_vel, flags.ev_hgt,
+                  flags.baro_hgt, flags.mag_3d, flags.mag_dec, flags.mag_hdg or flags.ev_yaw,
+                  f.holding_position)
+        if active == self._active_before:
             return
-        self._was_holding = f.holding_position
-        seen.gps_hor_pos.note_active(flags.gps)
-        seen.gps_hor_vel.note_active(flags.gps)
-        seen.gps_ver_vel.note_active(flags.gps)
-        seen.gps_height.note_active(flags.gps_hgt)
-        seen.ev_hor_pos.note_active(flags.ev_pos)
-        seen.ev_hor_vel.note_active(flags.ev_vel)
-        seen.ev_ver_vel.note_active(flags.ev_vel)
-        seen.ev_height.note_active(flags.ev_hgt)
-        seen.baro_height.note_active(flags.baro_hgt)
-        seen.mag.note_active(flags.mag_3d)
-        seen.declination.note_active(flags.mag_dec)
-        seen.yaw.note_active(flags.mag_hdg or flags.ev_yaw)
-        seen.fake_pos.note_active(f.holding_position)
-
-    _was_holding = False
+        self._active_before = active
+        gps, gps_hgt, ev_pos, ev_vel, ev_hgt, baro, mag_3d, mag_dec, yaw, holding = active
+        for record in (seen.gps_hor_pos, seen.gps_hor_vel, seen.gps_ver_vel):
+            record.note_active(gps)
+        seen.gps_height.note_active(gps_hgt)
+        seen.ev_hor_pos.note_active(ev_pos)
+        seen.ev_hor_vel.note_active(ev_vel)
+        seen.ev_ver_vel.note_active(ev_vel)
+        seen.ev_height.note_active(ev_hgt)
+        seen.baro_height.note_active(baro)
+        seen.mag.note_active(mag_3d)
+        seen.declination.note_active(mag_dec)
+        seen.yaw.note_active(yaw)
+        seen.fake_pos.note_active(holding)

@@ -11,7 +11,6 @@ from ekf_fusion_ros.ekf2.state import FILTER_PERIOD
 from ekf_fusion_ros.ekf2.state import SIZE
 from ekf_fusion_ros.kernels.magnetic import fuse_field_axis
 from ekf_fusion_ros.kernels.prediction import GRAVITY
-from ekf_fusion_ros.kernels.prediction import fill_transition
 from ekf_fusion_ros.kernels.prediction import predict_covariance
 from ekf_fusion_ros.kernels.update import apply_direct
 from ekf_fusion_ros.kernels.update import apply_update
@@ -22,9 +21,6 @@ Array = NDArray[np.float64]
 
 BAD_ACCEL_NOISE = 4.9
 """Accelerometer noise in m/s^2 while it clips or contradicts the height aiding."""
-
-FIELD_LEARNED_VARIANCE = 0.1
-WIND_LEARNED_VARIANCE = 1.0
 
 
 class Covariance:
@@ -44,13 +40,13 @@ class Covariance:
         imu, mag = params.imu, params.mag
         dt = FILTER_PERIOD
         self._angle_var = (dt * min(imu.gyro_noise, 1.0)) ** 2
-        self._accel_var = (dt * min(imu.accel_noise, 1.0)) ** 2
-        self._bad_accel_var = (dt * BAD_ACCEL_NOISE) ** 2
+        self._accel_var = np.full(3, (dt * min(imu.accel_noise, 1.0)) ** 2)
+        self._bad_accel_var = np.full(3, (dt * BAD_ACCEL_NOISE) ** 2)
         self._noise = np.zeros(SIZE)
         self._noise[10:13] = (dt * dt * imu.gyro_bias_process_noise) ** 2
         self._noise[13:16] = (dt * dt * imu.accel_bias_process_noise) ** 2
-        self._field_noise = ((dt * mag.earth_process_noise) ** 2,
-                             (dt * mag.body_process_noise) ** 2)
+        self._noise[16:19] = (dt * mag.earth_process_noise) ** 2
+        self._noise[19:22] = (dt * mag.body_process_noise) ** 2
         self._wind_noise = dt * params.aiding.wind_process_noise
         self._position_drift_var = dt * params.aiding.position_drift ** 2
         self._yaw_drift_var = dt * params.aiding.yaw_drift ** 2
@@ -64,24 +60,17 @@ class Covariance:
         imu (8,) raw increments; dt_avg mean filter period in s; climb_rate m/s scales the wind noise.
         """
         self._accel_bias_var_max = (0.1 * GRAVITY * dt_avg) ** 2
-        fill_transition(x[0:4], imu[0:3] - x[10:13], imu[3:6] - x[13:16], FILTER_PERIOD,
-                        self._transition)
-        velocity_var = np.full(3, self._bad_accel_var if bad_accel else self._accel_var)
-        if any(clipping):
-            velocity_var[list(clipping)] = self._bad_accel_var
-        p = self.p
-        noise = self._noise.copy()
-        if self.mag_active:
-            earth, body = self._field_noise
-            if p[16, 16] + p[17, 17] + p[18, 18] < FIELD_LEARNED_VARIANCE:
-                noise[16:19] = earth
-            if p[19, 19] + p[20, 20] + p[21, 21] < FIELD_LEARNED_VARIANCE:
-                noise[19:22] = body
-        if self.wind_active and p[22, 22] + p[23, 23] < WIND_LEARNED_VARIANCE:
+        velocity_var = self._accel_var
+        if bad_accel:
+            velocity_var = self._bad_accel_var
+        elif any(clipping):
+            velocity_var = np.where(clipping, self._bad_accel_var, self._accel_var)
+        noise = self._noise
+        if self.wind_active:
             noise[22:24] = (self._wind_noise * (1.0 + 0.5 * abs(climb_rate))) ** 2
         if self._position_drift_var > 0.0:
             noise[7:9] = self._position_drift_var * math.hypot(x[4], x[5])
-        predict_covariance(p, self._transition, self._angle_var, velocity_var, noise,
+        predict_covariance(self.p, self._transition, x, imu, self._angle_var, velocity_var, noise,
                            self.inhibited, self._saved, self.mag_active, self.wind_active)
         if self._yaw_drift_var > 0.0:
             self.add_yaw_variance(x[0:4], self._yaw_drift_var)

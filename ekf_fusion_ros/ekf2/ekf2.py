@@ -23,8 +23,7 @@ from ekf_fusion_ros.estimator import Event
 from ekf_fusion_ros.estimator import GeoPoint
 from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import NavState
-from ekf_fusion_ros.kernels.prediction import limit_state
-from ekf_fusion_ros.kernels.prediction import predict_state
+from ekf_fusion_ros.kernels.prediction import advance_state
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 from ekf_fusion_ros.params.spec import validate
 from ekf_fusion_ros.samples import BaroSample
@@ -66,7 +65,6 @@ class Ekf2:
         self._alignment = Alignment(self.filter, self.control.mag, self.control.baro,
                                     self.control.height, self._observation_length)
         self._learning = AccelBiasLearning(self.filter)
-        self._imu_position = np.array(self.params.imu.position)
         self._raw: ImuSample | None = None
         self._period_complete = False
         self.initialised = False
@@ -103,7 +101,7 @@ class Ekf2:
             self._predict()
             self.control.step()
         f = self.filter
-        f.output.propagate(raw, f.x, f.dt_imu_avg, f.dt_avg, self._imu_position)
+        f.output.propagate(raw, f.x, f.dt_imu_avg, f.dt_avg)
         if complete:
             delay = 1e-6 * (f.t_now - f.t_horizon)
             f.output.correct(f.x, delay, f.dt_imu_avg, f.dt_avg)
@@ -154,8 +152,9 @@ class Ekf2:
         f = self.filter
         f.imu = self.inertial.ring[0]
         increments = f.imu.increments
-        predict_state(f.x, f.rot, increments, f.earth.rate_ned, f.accel_lpf)
-        limit_state(f.x, f.dt_avg, self.params.imu.accel_bias_limit)
+        advance_state(f.x, f.rot, increments, f.earth.rate_ned, f.accel_lpf, f.dt_avg,
+                      self.params.imu.accel_bias_limit, self._learning.peaks,
+                      self._learning.decay)
         mean_dt = 0.5 * float(increments[6] + increments[7])
         f.dt_avg = 0.99 * f.dt_avg + 0.01 * min(max(mean_dt, 0.005), 0.02)
         if increments[6] > MIN_PERIOD_FOR_RATE:

@@ -100,7 +100,7 @@ class Filter:
         self.dt_avg = FILTER_PERIOD
         self.accel_lpf = np.zeros(2)
         self.flags = ControlFlags()
-        self.previous_flags = ControlFlags()
+        self.gps_hgt_before = False
         self.faults = FaultFlags()
         self.rejections = Rejections()
         self.times = FusionTimes()

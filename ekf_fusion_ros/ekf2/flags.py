@@ -38,11 +38,6 @@ class ControlFlags:
     synthetic_mag_z: bool = False
     vehicle_at_rest: bool = False
 
-    def copy_from(self, other: ControlFlags) -> None:
-        """Take over every flag of another set."""
-        for name in FLAG_NAMES:
-            setattr(self, name, getattr(other, name))
-
     def horizontal_aids(self) -> int:
         """Count the sources that constrain horizontal velocity or position."""
         return (self.gps + self.opt_flow + self.ev_pos + self.ev_vel

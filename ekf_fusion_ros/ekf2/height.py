@@ -159,7 +159,7 @@ class Height:
         if f.flags.gps_hgt:
             return
         self._select('gnss')
-        if not f.previous_flags.gps_hgt:
+        if not f.gps_hgt_before:
             altitude = 0.0 if f.fix is None else f.fix.altitude
             self.offset = altitude - f.earth.alt_ref + float(f.x[9])
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from ekf_fusion_ros.ekf2.filter import DelayedImu
 from ekf_fusion_ros.ekf2.state import SECOND
-from ekf_fusion_ros.kernels.inertial import accumulate_imu
-from ekf_fusion_ros.kernels.inertial import update_vibration
+from ekf_fusion_ros.kernels.inertial import take_imu
 from ekf_fusion_ros.samples import ImuSample
 
 DT_MIN = 1e-4
@@ -18,6 +17,7 @@ REST_TIME_US = SECOND
 ANGLE_VIBRATION_LIMIT = 1.0 / 4.0e4
 VELOCITY_VIBRATION_LIMIT = 1.0 / 2.1e2
 RATE_LIMIT = 0.05
+NO_CLIPPING = (False, False, False)
 
 
 class InertialInput:
@@ -39,38 +39,39 @@ class InertialInput:
         self._velocity = np.zeros(3)
         self._clock = np.zeros(2, dtype=np.float32)
         self._sums = np.zeros(1)
-        self._clipping = (False, False, False)
+        self._period = np.empty(8)
+        self._clipping = NO_CLIPPING
 
     def add(self, sample: ImuSample, in_air: bool) -> bool:
         """Take a raw sample; True when it completed a filter period."""
         dt = min(max(1e-6 * (sample.time_us - self.last_us), DT_MIN), DT_MAX)
         self.last_us = sample.time_us
         self.dt_avg = 0.8 * self.dt_avg + 0.2 * dt
-        update_vibration(sample.delta_angle, sample.delta_velocity, self._previous,
-                         self.vibration)
+        complete = take_imu(
+            sample.delta_angle, sample.delta_velocity, sample.delta_angle_dt,
+            sample.delta_velocity_dt, self._quat, self._velocity, self._clock, self._sums,
+            self._period, self._previous, self.vibration)
         self._detect_rest(sample, dt, in_air)
-        if sample.clipping != (False, False, False) or any(self._clipping):
+        if any(sample.clipping):
             x, y, z = (bool(a or b) for a, b in zip(self._clipping, sample.clipping))
             self._clipping = (x, y, z)
-        period = np.empty(8)
-        if not accumulate_imu(sample.delta_angle, sample.delta_velocity, sample.delta_angle_dt,
-                              sample.delta_velocity_dt, self._quat, self._velocity, self._clock,
-                              self._sums, period):
+        if not complete:
             return False
+        period, self._period = self._period, np.empty(8)
         self.ring.append(DelayedImu(sample.time_us, period, self._clipping))
-        self._clipping = (False, False, False)
+        self._clipping = NO_CLIPPING
         span = sample.time_us - self.ring[0].time_us
         self.min_interval_us = span // (self._observation_length - 1)
         return True
 
     def _detect_rest(self, sample: ImuSample, dt: float, in_air: bool) -> None:
         scale = self._moving_scaler
-        a = sample.delta_angle
+        angle = sample.delta_angle
         moving = (
             in_air
             or self.vibration[1] > ANGLE_VIBRATION_LIMIT * scale
             or self.vibration[2] > VELOCITY_VIBRATION_LIMIT * scale
-            or (a[0] * a[0] + a[1] * a[1] + a[2] * a[2]) > (RATE_LIMIT * scale * dt) ** 2)
+            or angle.dot(angle) > (RATE_LIMIT * scale * dt) ** 2)
         if moving:
             self._last_move_us = sample.time_us
         self.at_rest = sample.time_us - self._last_move_us > REST_TIME_US

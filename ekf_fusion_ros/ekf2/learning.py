@@ -19,33 +19,27 @@ class AccelBiasLearning:
     def __init__(self, f: Filter) -> None:
         """Act on a filter."""
         self._f = f
-        self._rate_peak = 0.0
-        self._accel_peak = 0.0
+        self.peaks = np.zeros(2)
+        self.decay = 1.0 - FILTER_PERIOD / f.params.imu.accel_bias_learn_time
         self._consistent_us = 0
 
     def step(self) -> None:
         """Decide for each axis; once per filter period, before the covariance prediction."""
         f = self._f
         imu = f.params.imu
-        d = f.imu.increments
-        share = FILTER_PERIOD / imu.accel_bias_learn_time
-        self._rate_peak = max(float(np.linalg.norm(d[0:3])) / FILTER_PERIOD,
-                              (1.0 - share) * self._rate_peak)
-        self._accel_peak = max(float(np.linalg.norm(d[3:6])) / FILTER_PERIOD,
-                               (1.0 - share) * self._accel_peak)
-        violent = (self._rate_peak > imu.accel_bias_learn_gyro_limit
-                   or self._accel_peak > imu.accel_bias_learn_accel_limit)
+        violent = (self.peaks[0] > imu.accel_bias_learn_gyro_limit
+                   or self.peaks[1] > imu.accel_bias_learn_accel_limit)
         inhibit_all = imu.inhibit_accel_bias or violent or f.faults.accel_vertical
         f.faults.accel_clipping = any(f.imu.clipping)
         for axis in range(3):
-            observable = f.flags.in_air or abs(f.rot[2, axis]) > OBSERVABLE_COS
-            inhibit = inhibit_all or not observable or f.imu.clipping[axis]
+            inhibit = (inhibit_all or f.imu.clipping[axis]
+                       or not (f.flags.in_air or abs(f.rot[2, axis]) > OBSERVABLE_COS))
             f.cov.inhibit_accel_bias(axis, inhibit)
 
     def check_consistency(self) -> None:
         """Forget a bias that both vertical velocity and height have opposed for 7 s."""
         f = self._f
-        down_bias = float(f.x[13:16] @ f.rot[2])
+        down_bias = float(f.x[13:16].dot(f.rot[2]))
         limit = 0.9 * f.params.imu.accel_bias_limit * f.dt_avg
         if abs(down_bias) <= limit or not self._opposed(down_bias):
             f.faults.accel_bias = False

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ekf_fusion_ros.kernels.output import attitude_error
 from ekf_fusion_ros.kernels.output import correct_output
 from ekf_fusion_ros.kernels.output import propagate_output
 from ekf_fusion_ros.mathlib.rotation import quat_multiply
@@ -30,7 +29,6 @@ class OutputPredictor:
         self.rot = np.zeros((3, 3))
         self.rate = np.zeros(3)
         self.yaw = np.zeros(2)
-        self.velocity_offset = np.zeros(3)
         self.tracking_error = np.zeros(3)
         self._history = np.zeros((history, 10))
         self._pushed = 0
@@ -42,31 +40,33 @@ class OutputPredictor:
         self._history[:] = x[0:10]
         self.now[:] = x[0:10]
 
-    def propagate(
-        self, imu: ImuSample, x: Array, dt_imu_avg: float, dt_avg: float, imu_position: Array,
-    ) -> None:
+    def propagate(self, imu: ImuSample, x: Array, dt_imu_avg: float, dt_avg: float) -> None:
         """Advance by one raw IMU sample."""
         propagate_output(self.now, self.rot, imu.delta_angle, imu.delta_velocity,
                          imu.delta_angle_dt, imu.delta_velocity_dt, x, dt_imu_avg / dt_avg,
-                         self._correction, self.yaw)
-        self.rate = imu.delta_angle / imu.delta_angle_dt
-        if imu_position.any():
-            self.velocity_offset = self.rot @ np.cross(self.rate, imu_position)
+                         self._correction, self.yaw, self.rate)
 
     def correct(self, x: Array, delay: float, dt_imu_avg: float, dt_avg: float) -> None:
         """Compare with the filter state (24,) that lies `delay` s in the past."""
         size = len(self._history)
         self._history[self._pushed % size] = self.now
         self._pushed += 1
-        filled = self._pushed >= size
-        oldest = self._pushed % size if filled else 0
-        error = attitude_error(x[0:4], self._history[oldest, 0:4])
-        self._correction = error * (0.5 * dt_imu_avg / max(delay, dt_imu_avg))
-        vel_gain = dt_avg / min(max(self._params.vel_tau, dt_avg), 10.0)
-        pos_gain = dt_avg / min(max(self._params.pos_tau, dt_avg), 10.0)
-        correct_output(self.now, self._history, oldest, x, self._integral, vel_gain, pos_gain,
-                       self.tracking_error[1:3])
-        self.tracking_error[0] = np.linalg.norm(error)
+        oldest = self._pushed % size if self._pushed >= size else 0
+        correct_output(self.now, self._history, oldest, x, self._integral,
+                       0.5 * dt_imu_avg / max(delay, dt_imu_avg),
+                       dt_avg / min(max(self._params.vel_tau, dt_avg), 10.0),
+                       dt_avg / min(max(self._params.pos_tau, dt_avg), 10.0),
+                       self._correction, self.tracking_error)
+
+    def velocity_at_origin(self, imu_position: Array) -> Array:
+        """Return the velocity (3,) of the body origin, given the IMU position (3,) in the body."""
+        velocity: Array = self.now[4:7] - self.rot @ np.cross(self.rate, imu_position)
+        return velocity
+
+    def position_at_origin(self, imu_position: Array) -> Array:
+        """Return the position (3,) of the body origin, given the IMU position (3,) in the body."""
+        position: Array = self.now[7:10] - self.rot @ imu_position
+        return position
 
     def rotate(self, delta: Array) -> None:
         """Turn the whole history by an earth-frame quaternion (4,), as a reset does."""

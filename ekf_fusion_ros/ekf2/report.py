@@ -12,7 +12,6 @@ from ekf_fusion_ros.ekf2.covariance import quat_by_rotation_vector
 from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import HealthLevel
 from ekf_fusion_ros.estimator import NavState
-from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
 
 if TYPE_CHECKING:
     from ekf_fusion_ros.ekf2.ekf2 import Ekf2
@@ -40,7 +39,6 @@ def nav_state(ekf: Ekf2) -> NavState:
     f = ekf.filter
     out = f.output
     q = out.now[0:4].copy()
-    rot = matrix_from_quat(q)
     lever = np.asarray(ekf.params.imu.position)
     p = f.cov.p
     validity = ekf.control.validity
@@ -48,8 +46,8 @@ def nav_state(ekf: Ekf2) -> NavState:
     return NavState(
         time_us=f.t_now,
         quaternion=q,
-        velocity=out.now[4:7] - out.velocity_offset,
-        position=out.now[7:10] - rot @ lever,
+        velocity=out.velocity_at_origin(lever),
+        position=out.position_at_origin(lever),
         angular_rate=out.rate - gyro_bias,
         pose_cov=pose_covariance(f.x[0:4], p),
         velocity_cov=p[4:7, 4:7].copy(),

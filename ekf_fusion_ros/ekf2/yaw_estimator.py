@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.kernels.prediction import GRAVITY
+from ekf_fusion_ros.kernels.yaw_bank import TILT_GAIN
+from ekf_fusion_ros.kernels.yaw_bank import advance_bank
+from ekf_fusion_ros.kernels.yaw_bank import combine_models
 from ekf_fusion_ros.kernels.yaw_bank import correct_models
-from ekf_fusion_ros.kernels.yaw_bank import predict_attitudes
-from ekf_fusion_ros.kernels.yaw_bank import predict_models
 from ekf_fusion_ros.mathlib.angles import wrap_pi
 from ekf_fusion_ros.mathlib.rotation import with_yaw
 
 Array = NDArray[np.float64]
 
 MODELS = 5
-TILT_GAIN = 0.2
 WEIGHT_FLOOR = 1e-5
 
 
@@ -36,8 +36,7 @@ class YawEstimator:
         self.cov = np.zeros((MODELS, 3, 3))
         self.weights = np.full(MODELS, 1.0 / MODELS)
         self.running = False
-        self.yaw = 0.0
-        self.variance = (0.5 * math.pi) ** 2
+        self._composite = np.array((0.0, (0.5 * math.pi) ** 2))
         self._accel = np.zeros(3)
         self._tilt_aligned = False
         self._velocity: Array | None = None
@@ -50,26 +49,35 @@ class YawEstimator:
 
     def step(self, imu: Array, airborne: bool, airspeed: float, gyro_bias: Array) -> None:
         """Advance by one filter period; imu (8,) raw increments, airspeed m/s (0 = unknown)."""
-        dt = imu[7]
-        accel = imu[3:6] / max(dt, 1e-3)
-        share = min(10.0 * dt * TILT_GAIN, 1.0)
-        self._accel = self._accel * (1.0 - share) + accel * share
         velocity, self._velocity = self._velocity, None
         if not self._tilt_aligned:
             self._velocity = velocity
-            self._align_tilt(imu[3:6], float(np.linalg.norm(accel)))
+            self._align_tilt(imu)
             return
-        predict_attitudes(self.rot, self.bias, imu, self._accel, self._gain(airspeed), airspeed)
-        if self.running:
-            predict_models(self.rot, self.state, self.cov, imu)
+        advance_bank(self.rot, self.bias, self.state, self.cov, imu, self._accel, airspeed,
+                     self.running)
         if airborne and velocity is not None:
             self._use(velocity, gyro_bias)
         elif not airborne:
             self.running = False
         if self.running:
-            self._combine()
+            combine_models(self.state, self.cov, self.weights, self._composite)
 
-    def _align_tilt(self, delta_velocity: Array, norm: float) -> None:
+    @property
+    def yaw(self) -> float:
+        """Yaw of the weighted sum in rad."""
+        return float(self._composite[0])
+
+    @property
+    def variance(self) -> float:
+        """Variance of the weighted sum in rad^2."""
+        return float(self._composite[1])
+
+    def _align_tilt(self, imu: Array) -> None:
+        delta_velocity, dt = imu[3:6], max(float(imu[7]), 1e-3)
+        share = min(10.0 * dt * TILT_GAIN, 1.0)
+        self._accel = self._accel * (1.0 - share) + delta_velocity / dt * share
+        norm = float(np.linalg.norm(delta_velocity)) / dt
         if not 0.9 * GRAVITY < norm < 1.1 * GRAVITY:
             return
         down = -delta_velocity / np.linalg.norm(delta_velocity)
@@ -77,13 +85,6 @@ class YawEstimator:
         north /= np.linalg.norm(north)
         self.rot[:] = np.vstack((north, np.cross(down, north), down))
         self._tilt_aligned = True
-
-    def _gain(self, airspeed: float) -> float:
-        """Trust the accelerometer less the farther it is from 1 g."""
-        norm = float(np.linalg.norm(self._accel))
-        attenuation = 1.0 if airspeed > 0.0 and norm > GRAVITY else 2.0
-        excess = min(attenuation * abs(norm - GRAVITY) / GRAVITY, 1.0)
-        return TILT_GAIN * (1.0 - excess) ** 2
 
     def _use(self, velocity: Array, gyro_bias: Array) -> None:
         if not self.running:
@@ -116,11 +117,3 @@ class YawEstimator:
         self.cov[:] = 0.0
         self.cov[:, 0, 0] = self.cov[:, 1, 1] = self._accuracy ** 2
         self.cov[:, 2, 2] = (0.5 * spacing) ** 2
-
-    def _combine(self) -> None:
-        yaws = self.state[:, 2]
-        east = float(self.weights @ np.sin(yaws))
-        north = float(self.weights @ np.cos(yaws))
-        self.yaw = math.atan2(east, north)
-        spread = (yaws - self.yaw + math.pi) % (2.0 * math.pi) - math.pi
-        self.variance = float(self.weights @ (self.cov[:, 2, 2] + spread * spread))

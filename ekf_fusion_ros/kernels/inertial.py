@@ -76,6 +76,18 @@ def accumulate_imu(
 
 
 @kernel
+def take_imu(
+    delta_angle: Array, delta_velocity: Array, angle_dt: float, velocity_dt: float,
+    quat: Array, velocity: Array, clock: NDArray[np.float32], sums: Array, out: Array,
+    previous: Array, metrics: Array,
+) -> bool:
+    """Run update_vibration and accumulate_imu on one raw sample."""
+    update_vibration(delta_angle, delta_velocity, previous, metrics)
+    return accumulate_imu(delta_angle, delta_velocity, angle_dt, velocity_dt, quat, velocity,
+                          clock, sums, out)
+
+
+@kernel
 def update_vibration(
     delta_angle: Array, delta_velocity: Array, previous: Array, metrics: Array,
 ) -> None:

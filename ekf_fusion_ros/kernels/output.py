@@ -23,16 +23,18 @@ Array = NDArray[np.float64]
 @kernel
 def propagate_output(
     out: Array, rot: Array, delta_angle: Array, delta_velocity: Array, angle_dt: float,
-    velocity_dt: float, x: Array, bias_scale: float, correction: Array, yaw: Array,
+    velocity_dt: float, x: Array, bias_scale: float, correction: Array, yaw: Array, rate: Array,
 ) -> None:
     """Advance out (10,) and rot (3, 3) by one raw IMU sample, in place.
 
     bias_scale turns biases per filter period into biases per raw sample; correction (3,) rad;
-    yaw (2,) accumulates the turn about the vertical and low-passes its rate.
+    yaw (2,) accumulates the turn about the vertical and low-passes its rate; rate (3,) receives the
+    raw body rate.
     """
     angle = np.empty(3)
     spin = 0.0
     for i in range(3):
+        rate[i] = delta_angle[i] / angle_dt
         angle[i] = delta_angle[i] - x[10 + i] * bias_scale + correction[i]
         spin += angle[i] * rot[2, i]
     yaw[0] += spin
@@ -64,21 +66,26 @@ def attitude_error(q: Array, oldest: Array) -> Array:
 
 @kernel
 def correct_output(
-    out: Array, history: Array, oldest: int, x: Array, integral: Array, vel_gain: float,
-    pos_gain: float, errors: Array,
+    out: Array, history: Array, oldest: int, x: Array, integral: Array, att_gain: float,
+    vel_gain: float, pos_gain: float, correction: Array, errors: Array,
 ) -> None:
-    """Shift velocity and position of the whole history towards the filter (PI), in place.
+    """Compare the oldest entry of the history with the filter state x (24,), in place.
 
-    integral (6,) of the velocity and position errors; errors (2,) receives their norms.
+    correction (3,) receives the attitude correction for each of the coming raw samples. Velocity and
+    position of the whole history move towards the filter (PI); integral (6,) of their errors. errors
+    (3,) receives the norms of the attitude, velocity and position errors.
     """
+    error = attitude_error(x[0:4], history[oldest, 0:4])
+    correction[:] = error * att_gain
     norm = np.zeros(2)
     for i in range(6):
-        error = x[4 + i] - history[oldest, 4 + i]
-        integral[i] += error
+        difference = x[4 + i] - history[oldest, 4 + i]
+        integral[i] += difference
         gain = vel_gain if i < 3 else pos_gain
-        shift = error * gain + integral[i] * gain * gain * 0.1
+        shift = difference * gain + integral[i] * gain * gain * 0.1
         history[:, 4 + i] += shift
         out[4 + i] += shift
-        norm[i // 3] += error * error
-    errors[0] = np.sqrt(norm[0])
-    errors[1] = np.sqrt(norm[1])
+        norm[i // 3] += difference * difference
+    errors[0] = np.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
+    errors[1] = np.sqrt(norm[0])
+    errors[2] = np.sqrt(norm[1])

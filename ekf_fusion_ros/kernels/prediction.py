@@ -21,6 +21,9 @@ from ekf_fusion_ros.mathlib.rotation import quat_normalise
 
 Array = NDArray[np.float64]
 GRAVITY = 9.80665
+NOMINAL_PERIOD = 0.01
+FIELD_LEARNED_VARIANCE = 0.1
+WIND_LEARNED_VARIANCE = 1.0
 
 
 @kernel
@@ -49,6 +52,23 @@ def predict_state(x: Array, rot: Array, imu: Array, earth_rate: Array, accel_lpf
         previous = x[4 + i]
         x[4 + i] = previous + increment
         x[7 + i] += 0.5 * (previous + x[4 + i]) * dt
+
+
+@kernel
+def advance_state(
+    x: Array, rot: Array, imu: Array, earth_rate: Array, accel_lpf: Array, dt_avg: float,
+    accel_bias_limit: float, peaks: Array, decay: float,
+) -> None:
+    """Predict and limit the state; peaks (2,) follow rate in rad/s and specific force in m/s^2.
+
+    A peak falls by the factor decay per period.
+    """
+    predict_state(x, rot, imu, earth_rate, accel_lpf)
+    limit_state(x, dt_avg, accel_bias_limit)
+    rate = math.sqrt(imu[0] ** 2 + imu[1] ** 2 + imu[2] ** 2) / NOMINAL_PERIOD
+    force = math.sqrt(imu[3] ** 2 + imu[4] ** 2 + imu[5] ** 2) / NOMINAL_PERIOD
+    peaks[0] = max(rate, decay * peaks[0])
+    peaks[1] = max(force, decay * peaks[1])
 
 
 @kernel
@@ -119,22 +139,31 @@ def fill_transition(q: Array, da: Array, dv: Array, dt: float, f: Array) -> None
 
 
 @kernel
+def _add_unless_learned(p: Array, noise: Array, first: int, size: int, limit: float) -> None:
+    """Let slowly varying states drift only while their variances sum to less than a limit."""
+    total = 0.0
+    for i in range(first, first + size):
+        total += p[i, i]
+    if total < limit:
+        for i in range(first, first + size):
+            p[i, i] += noise[i]
+
+
+@kernel
 def predict_covariance(
-    p: Array, f: Array, angle_var: float, velocity_var: Array, noise: Array,
+    p: Array, f: Array, x: Array, imu: Array, angle_var: float, velocity_var: Array, noise: Array,
     inhibited: Array, saved: Array, mag_active: bool, wind_active: bool,
 ) -> None:
     """P <- F P F' + G Q G' + N in place.
 
-    p (24, 24); f (10, 24) from fill_transition; angle_var rad^2 and velocity_var (3,) (m/s)^2 of the
+    p (24, 24); f (10, 24) scratch, zero where fill_transition does not write; x (24,) the predicted
+    state; imu (8,) the raw increments; angle_var rad^2 and velocity_var (3,) (m/s)^2 of the
     increments; noise (24,) the additive process noise. inhibited (3,) marks accelerometer axes whose
     bias is not estimated: they keep the saved (3,) variance and no correlation with states 0 to 15
     (that with field and wind survives, as in the reference filter). Inactive magnetic and wind
     blocks are zero.
     """
-    if not mag_active:
-        noise[16:22] = 0.0
-    if not wind_active:
-        noise[22:24] = 0.0
+    fill_transition(x[0:4], imu[0:3] - x[10:13], imu[3:6] - x[13:16], NOMINAL_PERIOD, f)
     frozen = p[7, 7] + p[8, 8] > 1e4
     top = f @ p
     block = top @ f.T
@@ -160,8 +189,13 @@ def predict_covariance(
     if frozen:
         p[7:9, :] = kept
         p[:, 7:9] = kept.T
-    for i in range(10, 24):
+    for i in range(7, 16):
         p[i, i] += noise[i]
+    if mag_active:
+        _add_unless_learned(p, noise, 16, 3, FIELD_LEARNED_VARIANCE)
+        _add_unless_learned(p, noise, 19, 3, FIELD_LEARNED_VARIANCE)
+    if wind_active:
+        _add_unless_learned(p, noise, 22, 2, WIND_LEARNED_VARIANCE)
     for k in range(3):
         if inhibited[k] != 0.0:
             p[13 + k, 0:16] = 0.0

@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.kernels.compile import kernel
+from ekf_fusion_ros.kernels.prediction import GRAVITY
 
 Array = NDArray[np.float64]
 
+TILT_GAIN = 0.2
 BIAS_GAIN = 0.04
 BIAS_LIMIT = 0.05
 BIAS_LEARN_RATE_MAX = 0.175
@@ -23,6 +25,41 @@ ACCEL_NOISE = 2.0
 GYRO_NOISE = 0.1
 VARIANCE_FLOOR = 1e-6
 CLIP_SIGMA = 5.0
+
+
+@kernel
+def advance_bank(
+    rot: Array, bias: Array, state: Array, cov: Array, imu: Array, accel: Array, airspeed: float,
+    running: bool,
+) -> None:
+    """Advance every model over imu (8,) and the low-passed accel (3,), in place."""
+    share = min(10.0 * imu[7] * TILT_GAIN, 1.0)
+    dt = max(imu[7], 1e-3)
+    for i in range(3):
+        accel[i] = accel[i] * (1.0 - share) + imu[3 + i] / dt * share
+    norm = math.sqrt(accel[0] ** 2 + accel[1] ** 2 + accel[2] ** 2)
+    # the accelerometer says less about tilt the farther it is from 1 g; a banked turn has more
+    attenuation = 2.0
+    if airspeed > 0.0 and norm > GRAVITY:
+        attenuation = 1.0
+    excess = min(attenuation * abs(norm - GRAVITY) / GRAVITY, 1.0)
+    predict_attitudes(rot, bias, imu, accel, TILT_GAIN * (1.0 - excess) ** 2, airspeed)
+    if running:
+        predict_models(rot, state, cov, imu)
+
+
+@kernel
+def combine_models(state: Array, cov: Array, weights: Array, out: Array) -> None:
+    """Fill out (2,) with yaw in rad and its variance in rad^2 of the weighted sum."""
+    north = east = 0.0
+    for m in range(weights.shape[0]):
+        north += weights[m] * math.cos(state[m, 2])
+        east += weights[m] * math.sin(state[m, 2])
+    out[0] = math.atan2(east, north)
+    out[1] = 0.0
+    for m in range(weights.shape[0]):
+        spread = (state[m, 2] - out[0] + math.pi) % (2.0 * math.pi) - math.pi
+        out[1] += weights[m] * (cov[m, 2, 2] + spread * spread)
 
 
 @kernel

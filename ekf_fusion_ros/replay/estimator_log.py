@@ -108,8 +108,8 @@ def row(ekf: Ekf2) -> list[float]:
 def _output(ekf: Ekf2) -> list[float]:
     out = ekf.filter.output
     lever = np.asarray(ekf.params.imu.position)
-    return [*out.now[0:4].tolist(), *(out.now[4:7] - out.velocity_offset).tolist(),
-            *(out.now[7:10] - out.rot @ lever).tolist()]
+    return [*out.now[0:4].tolist(), *out.velocity_at_origin(lever).tolist(),
+            *out.position_at_origin(lever).tolist()]
 
 
 def _rejections(ekf: Ekf2) -> int:
