@@ -1,0 +1,367 @@
+"""The command line end to end: files, windows, exit statuses, damaged input."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import json
+import math
+import shutil
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rosbags')
+pytest.importorskip('tqdm')
+
+from rosbags.rosbag2 import Reader
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer
+from rosbags.typesys import Stores
+from rosbags.typesys import get_typestore
+
+from ekf_fusion_ros.replay.cli import main
+from ekf_fusion_ros.replay.recording import write_recording
+from ekf_fusion_ros.simulation.scenario import Scenario
+from ekf_fusion_ros.simulation.scenario import default_sensors
+from ekf_fusion_ros.simulation.trajectory import FigureOfEight
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+HEADER = 't,x,y,z,qx,qy,qz,qw,vx,vy,vz,yaw,var_x,var_y,var_z,var_yaw'.split(',')
+AUTOPILOT = ('imu', 'fix', 'magnetic_field', 'pressure')
+DURATION = 30.0
+
+
+@pytest.fixture(scope='module')
+def flight(tmp_path_factory):
+    """A simulated recording with the sensors of an autopilot and its truth."""
+    folder = tmp_path_factory.mktemp('flight')
+    scenario = Scenario(
+        trajectory=FigureOfEight(duration=DURATION), sensors=default_sensors(AUTOPILOT), seed=3)
+    write_recording(folder / 'flight', scenario.arrivals())
+    return folder / 'flight', scenario
+
+
+@pytest.fixture(scope='module')
+def replayed(flight, tmp_path_factory):
+    output = tmp_path_factory.mktemp('replayed')
+    assert main([str(flight[0]), '--output', str(output)]) == 0
+    return output
+
+
+def rows(output):
+    with (output / 'trajectory.csv').open() as file:
+        table = list(csv.reader(file))
+    assert table[0] == HEADER
+    return np.array(table[1:], dtype=float)
+
+
+def summary(output):
+    return json.loads((output / 'summary.json').read_text())
+
+
+def run(recording, output, *arguments):
+    return main([str(recording), '--output', str(output), '--no-bag', *arguments])
+
+
+def test_files_and_their_agreement(flight, replayed):
+    table = rows(replayed)
+    tum = np.loadtxt(replayed / 'trajectory.tum')
+    assert len(table) > 500
+    assert np.array_equal(tum, table[:, :8])
+    assert np.allclose(np.linalg.norm(table[:, 4:8], axis=1), 1.0, atol=1e-9)
+    x, y, z, w = table[:, 4:8].T
+    yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    assert np.allclose(np.angle(np.exp(1j * (yaw - table[:, 11]))), 0.0, atol=1e-9)
+    assert (table[:, 12:] > 0).all()
+    assert np.allclose(np.diff(table[:, 0]), 0.02, atol=0.013)
+
+
+def horizontal_rms(scenario, output):
+    """Return the error against truth in m after the alignment."""
+    table = rows(output)
+    table = table[table[:, 0] > scenario.start_us * 1e-6 + 15.0]
+    origin = summary(output)['origin']
+    # Small angles: metres per degree on the WGS84 ellipsoid at this latitude.
+    lat = math.radians(scenario.origin.lat)
+    north = (origin['lat'] - scenario.origin.lat) * (111132.95 - 559.85 * math.cos(2 * lat))
+    east = (origin['lon'] - scenario.origin.lon) * (
+        111412.88 * math.cos(lat) - 93.5 * math.cos(3 * lat))
+    truth = scenario.trajectory.motion(table[:, 0] - scenario.start_us * 1e-6).position
+    errors = np.hypot(table[:, 1] + east - truth[:, 1], table[:, 2] + north - truth[:, 0])
+    return np.sqrt(np.mean(np.square(errors)))
+
+
+def test_the_track_follows_the_truth(flight, replayed):
+    assert horizontal_rms(flight[1], replayed) < 1.5
+
+
+def test_summary_is_complete_and_exact(flight, replayed):
+    about = summary(replayed)
+    assert about['frame'] == 'map'
+    assert set(about['origin']) == {'lat', 'lon', 'alt'}
+    assert about['duration'] == pytest.approx(DURATION, abs=0.5)
+    for topic in about['topics'].values():
+        assert topic['received'] == topic['accepted'] + sum(topic['refused'].values())
+    counts = {topic['role']: topic['received'] for topic in about['topics'].values()}
+    with Reader(flight[0]) as reader:
+        recorded = {one.topic: one.msgcount for one in reader.connections}
+    assert counts['imu'] == recorded['/imu/data_raw']
+    assert counts['fix'] == recorded['/fix']
+    position = about['aid_sources']['gnss_position']
+    assert position['fused'] > 50 and position['starts'] >= 1
+    assert position['first'] < position['last']
+    assert {'events', 'resets', 'alignment', 'cpu_seconds', 'real_time_factor', 'versions',
+            'recording'} <= set(about)
+    assert about['events']
+
+
+def test_fused_bag_holds_the_rows(replayed):
+    table = rows(replayed)
+    with Reader(replayed / 'fused') as reader:
+        odometry = [STORE.deserialize_cdr(data, one.msgtype)
+                    for one, _, data in reader.messages() if one.topic == '/odometry/filtered']
+        topics = {one.topic for one in reader.connections}
+    assert topics == {'/odometry/filtered', '/odometry/gps', '/gps/filtered'}
+    assert len(odometry) == len(table)
+    for message, row in zip(odometry[::50], table[::50], strict=True):
+        position = message.pose.pose.position
+        assert [position.x, position.y, position.z] == row[1:4].tolist()
+        assert message.pose.covariance[0] == row[12]
+        stamp = message.header.stamp
+        assert stamp.sec + stamp.nanosec * 1e-9 == pytest.approx(row[0], abs=1e-6)
+
+
+def test_same_input_same_bytes(flight, replayed, tmp_path):
+    assert main([str(flight[0]), '--output', str(tmp_path)]) == 0
+    for name in ('trajectory.csv', 'trajectory.tum', 'alignment.csv'):
+        assert (tmp_path / name).read_bytes() == (replayed / name).read_bytes()
+    bags = [next((folder / 'fused').glob('*.mcap')) for folder in (tmp_path, replayed)]
+    assert bags[0].read_bytes() == bags[1].read_bytes()
+
+
+def test_rate_zero_holds_the_slower_rows(flight, replayed, tmp_path):
+    assert run(flight[0], tmp_path, '--rate', '0') == 0
+    every, slow = rows(tmp_path), rows(replayed)
+    assert len(every) > 1.8 * len(slow)
+    found = np.isin(slow[:, 0], every[:, 0])
+    assert found.all()
+    same = every[np.isin(every[:, 0], slow[:, 0])]
+    assert np.array_equal(same, slow)
+
+
+def test_start_and_end(flight, tmp_path):
+    assert run(flight[0], tmp_path, '--start', '2', '--end', '20') == 0
+    about = summary(tmp_path)
+    table = rows(tmp_path)
+    start = flight[1].start_us * 1e-6
+    assert table[-1, 0] == pytest.approx(start + 20, abs=0.1)
+    imu = next(topic for topic in about['topics'].values() if topic['role'] == 'imu')
+    assert imu['received'] == pytest.approx(18 * 250, abs=3)
+
+
+def test_withheld_fixes_are_counted_and_not_fused(flight, replayed, tmp_path):
+    assert run(flight[0], tmp_path, '--withhold', 'fix=15:20,22:23') == 0
+    fix = next(t for t in summary(tmp_path)['topics'].values() if t['role'] == 'fix')
+    assert fix['refused'] == {'withheld': 30}
+    whole, gap = rows(replayed), rows(tmp_path)
+    assert len(whole) == len(gap)
+    start = flight[1].start_us * 1e-6
+    before = whole[:, 0] < start + 15.0
+    assert np.array_equal(whole[before], gap[before])
+    inside = (whole[:, 0] > start + 17.0) & (whole[:, 0] < start + 20.0)
+    assert (gap[inside, 12] > whole[inside, 12]).all()
+
+
+def test_states_of_every_update(flight, tmp_path):
+    assert run(flight[0], tmp_path, '--log-states', '--end', '5') == 0
+    with (tmp_path / 'estimator.csv').open() as file:
+        table = list(csv.DictReader(file))
+    assert len(table) > 300
+    norm = sum(float(table[-1][name]) ** 2 for name in ('q0', 'q1', 'q2', 'q3'))
+    assert norm == pytest.approx(1.0, abs=1e-6)
+
+
+def test_role_kept_out_and_role_added(flight, tmp_path, capsys):
+    assert run(flight[0], tmp_path, '--topic', 'magnetic_field=', '--end', '3') == 0
+    assert 'magnetic_field' not in [t['role'] for t in summary(tmp_path)['topics'].values()]
+    assert 'left out as asked: /mag' in capsys.readouterr().out
+
+
+def test_parameters_in_order_of_files_then_set(flight, tmp_path):
+    first, second = tmp_path / 'first.yaml', tmp_path / 'second.yaml'
+    for path, rate in ((first, 5), (second, 10)):
+        path.write_text(f'/**:\n  ros__parameters:\n    session:\n      output_rate: {rate}.0\n')
+    arguments = ['--params', str(first), '--params', str(second), '--end', '20']
+    assert run(flight[0], tmp_path / 'a', *arguments) == 0
+    assert np.median(np.diff(rows(tmp_path / 'a')[:, 0])) == pytest.approx(0.1, abs=0.01)
+    assert run(flight[0], tmp_path / 'b', *arguments, '--set', 'session.output_rate=20') == 0
+    assert np.median(np.diff(rows(tmp_path / 'b')[:, 0])) == pytest.approx(0.05, abs=0.01)
+
+
+@pytest.mark.parametrize(('arguments', 'words'), [
+    (['--set', 'ekf2.gnss.dely_ms=3'], 'ekf2.gnss.delay_ms'),
+    (['--set', 'ekf2.gnss.delay_ms=-3'], 'at least 0'),
+    (['--set', 'ekf2.gnss.delay_ms=soon'], 'a number'),
+    (['--set', 'nonsense'], 'name=value'),
+    (['--params', 'none.yaml'], 'none.yaml'),
+    (['--topic', 'odometer=/odom'], 'unknown role'),
+    (['--topic', 'flow=/flow'], 'not supported'),
+    (['--topic', 'fix'], 'role=/name'),
+    (['--withhold', 'fix=20'], 'window'),
+    (['--withhold', 'fix=20:10'], 'ends before'),
+    (['--start', '-1'], 'seconds from 0'),
+    (['--start', '5', '--end', '4'], 'not after'),
+    (['--rate', '-1'], 'at least 0'),
+    (['--rate', 'fast'], 'invalid float'),
+    (['--nonsense'], 'unrecognized'),
+])
+def test_wrong_arguments_end_with_2_and_a_sentence(flight, tmp_path, capsys, arguments, words):
+    assert run(flight[0], tmp_path / 'out', *arguments) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert 'Traceback' not in said
+
+
+def test_output_that_is_a_file(flight, tmp_path, capsys):
+    (tmp_path / 'out').write_text('')
+    assert run(flight[0], tmp_path / 'out') == 2
+    assert 'out' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('name', ['none', 'none.mcap', 'none.csv'])
+def test_missing_recording_ends_with_1(tmp_path, capsys, name):
+    assert run(tmp_path / name, tmp_path / 'out') == 1
+    assert name in capsys.readouterr().err
+    assert not (tmp_path / 'out').exists()
+
+
+@pytest.mark.parametrize(('name', 'content'), [
+    ('a.mcap', b''), ('a.db3', b'junk' * 500), ('a.txt', b'text'), ('a.csv', b''),
+    ('a.csv', b'time_us,sensor\n'), ('a.csv.gz', b'no gzip'), ('a.csv', b'\xff\xfe\x00junk\n'),
+])
+def test_foreign_recording_ends_with_1_and_one_sentence(tmp_path, capsys, name, content):
+    path = tmp_path / name
+    path.write_bytes(content)
+    assert run(path, tmp_path / 'out') == 1
+    said = capsys.readouterr().err.strip()
+    assert name in said
+    assert '\n' not in said
+
+
+def test_missing_topic_ends_with_1(flight, tmp_path, capsys):
+    assert run(flight[0], tmp_path / 'out', '--topic', 'odometry=/odom') == 1
+    assert '/odom' in capsys.readouterr().err
+
+
+def test_truncated_recording_is_replayed_as_far_as_it_goes(flight, replayed, tmp_path, capsys):
+    data = next(flight[0].glob('*.mcap')).read_bytes()
+    cut = tmp_path / 'cut.mcap'
+    cut.write_bytes(data[:int(0.8 * len(data))])
+    assert run(cut, tmp_path / 'out') == 0
+    assert 'damaged' in capsys.readouterr().out
+    whole, part = rows(replayed), rows(tmp_path / 'out')
+    assert 0.6 * len(whole) < len(part) < 0.95 * len(whole)
+    assert np.array_equal(part[:-5], whole[:len(part) - 5])
+    assert any('damaged' in note for note in summary(tmp_path / 'out')['notes'])
+
+
+def spoil(message, rng):
+    """Spoil a message in one of many ways."""
+    ways = [
+        lambda m: (setattr(m.header.stamp, 'sec', 0), setattr(m.header.stamp, 'nanosec', 0)),
+        lambda m: setattr(m.header.stamp, 'sec', m.header.stamp.sec + 100_000),
+        lambda m: setattr(m.header.stamp, 'sec', m.header.stamp.sec - 1),
+    ]
+    if hasattr(message, 'linear_acceleration'):
+        ways += [
+            lambda m: setattr(m.linear_acceleration, 'x', math.nan),
+            lambda m: setattr(m.angular_velocity, 'z', math.inf),
+            lambda m: setattr(m, 'angular_velocity_covariance', np.full(9, math.nan)),
+        ]
+    if hasattr(message, 'latitude'):
+        ways += [
+            lambda m: setattr(m, 'latitude', math.nan),
+            lambda m: setattr(m.status, 'status', -1),
+            lambda m: setattr(m, 'position_covariance', np.full(9, -4.0)),
+        ]
+    ways[rng.integers(len(ways))](message)
+
+
+def test_bad_messages_between_good_ones(flight, tmp_path):
+    """Each is counted by reason, the output stays finite and near the truth."""
+    rng = np.random.default_rng(1)
+    spoiled = tmp_path / 'spoiled'
+    with Reader(flight[0]) as reader, \
+            Writer(spoiled, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        connections = {one.topic: writer.add_connection(one.topic, one.msgtype, typestore=STORE)
+                       for one in reader.connections}
+        for number, (one, time_ns, data) in enumerate(reader.messages()):
+            if number % 10 == 9:
+                message = STORE.deserialize_cdr(data, one.msgtype)
+                spoil(message, rng)
+                data = STORE.serialize_cdr(message, one.msgtype)
+            if number % 97 == 5:
+                writer.write(connections[one.topic], time_ns, bytes(data)[:18])
+            writer.write(connections[one.topic], time_ns, data)
+    assert run(spoiled, tmp_path / 'out') == 0
+    about, table = summary(tmp_path / 'out'), rows(tmp_path / 'out')
+    reasons = set()
+    for topic in about['topics'].values():
+        assert topic['received'] == topic['accepted'] + sum(topic['refused'].values())
+        reasons |= set(topic['refused'])
+    assert {'zero_stamp', 'stamp_jump', 'backward_stamp', 'not_finite', 'nan_covariance',
+            'undecodable'} <= reasons
+    assert len(table) > 300
+    assert np.isfinite(table).all()
+    assert horizontal_rms(flight[1], tmp_path / 'out') < 1.5
+    assert about['resets']['restarts'] == 0
+
+
+def test_sensor_csv(tmp_path):
+    """At rest with barometer and magnetometer alone: level, and it stays where it is."""
+    lines = []
+    for step in range(1, 1251):
+        time_us = 1_000_000 + 8000 * step
+        if step % 5 == 0:
+            lines += [f'{time_us},mag,0.21,0.0,0.42', f'{time_us},baro,100.0']
+        lines.append(f'{time_us},imu,0.0,0.0,-9.80665,0.0,0.0,0.0')
+    path = tmp_path / 'rest.csv.gz'
+    path.write_bytes(gzip.compress('\n'.join(lines).encode()))
+    assert run(path, tmp_path / 'out', '--set', 'ekf2.gnss.enabled=false', '--log-states') == 0
+    about, table = summary(tmp_path / 'out'), rows(tmp_path / 'out')
+    assert about['frame'] == 'local'
+    assert about['topics']['imu']['received'] == 1250
+    assert np.abs(table[:, 1:4]).max() < 0.1
+    assert np.abs(table[:, 4:6]).max() < 0.01
+    assert np.degrees(table[-1, 11]) == pytest.approx(90.0, abs=1.0)
+
+
+@pytest.mark.parametrize('storage', [
+    'rl_husky_db3', 'rl_husky_db3_zstd_file', 'rl_husky_db3_zstd_message', 'rl_husky_mcap_zstd'])
+def test_storages_of_a_real_recording_give_one_track(shared, tmp_path, storage):
+    folder = shared / 'data' / 'rl_husky'
+    if not folder.is_dir():
+        pytest.skip('recording rl_husky is not beside the repository')
+    for name in (storage, 'rl_husky_mcap'):
+        assert run(folder / name, tmp_path / name, '--end', '40') == 0
+    ours, theirs = (tmp_path / name / 'trajectory.csv' for name in (storage, 'rl_husky_mcap'))
+    assert ours.read_bytes() == theirs.read_bytes()
+    assert len(rows(tmp_path / storage)) > 500
+    shutil.rmtree(tmp_path)
+
+
+def test_odometry_alone_is_local(shared, tmp_path):
+    recording = shared / 'data' / 'rl_jackal' / 'rl_jackal_mcap'
+    if not recording.is_dir():
+        pytest.skip('recording rl_jackal is not beside the repository')
+    assert main([str(recording), '--output', str(tmp_path)]) == 0
+    about = summary(tmp_path)
+    assert about['frame'] == 'local'
+    assert about['origin'] is None
+    with Reader(recording) as reader:
+        last = [STORE.deserialize_cdr(data, one.msgtype) for one, _, data in reader.messages()
+                if one.msgtype.endswith('Odometry')][-1].pose.pose.position
+    assert rows(tmp_path)[-1, 1:3] == pytest.approx([last.x, last.y], abs=0.3)
+    with Reader(tmp_path / 'fused') as reader:
+        assert {one.topic for one in reader.connections} == {'/odometry/filtered'}
