@@ -68,10 +68,12 @@ class Covariance:
         noise = self._noise
         if self.wind_active:
             noise[22:24] = (self._wind_noise * (1.0 + 0.5 * abs(climb_rate))) ** 2
-        if self._position_drift_var > 0.0:
-            noise[7:9] = self._position_drift_var * math.hypot(x[4], x[5])
         predict_covariance(self.p, self._transition, x, imu, self._angle_var, velocity_var, noise,
                            self.inhibited, self._saved, self.mag_active, self.wind_active)
+        if self._position_drift_var > 0.0:
+            variance = self._position_drift_var * math.hypot(x[4], x[5])
+            self.p[7, 7] += variance
+            self.p[8, 8] += variance
         if self._yaw_drift_var > 0.0:
             self.add_yaw_variance(x[0:4], self._yaw_drift_var)
         self._limit()
