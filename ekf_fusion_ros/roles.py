@@ -65,7 +65,8 @@ def _wanted(params: Params, roles: Collection[str]) -> dict[str, dict[str, Any]]
         'gnss': {'enabled': has_fix},
     }
     if PRESSURE not in roles:
-        wanted['height'] = {'reference': 'gnss' if has_fix else 'vision'}
+        wanted['height'] = {
+            'reference': 'gnss' if has_fix else 'vision', 'gnss_absolute': has_fix}
     if MAGNETIC_FIELD not in roles:
         wanted['mag'] = {'type': 'none'}
     if ODOMETRY in roles:

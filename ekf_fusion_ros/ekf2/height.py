@@ -154,12 +154,14 @@ class Height:
         self.offset = 0.0
 
     def start_gnss(self) -> None:
-        """Make GNSS height the reference, without a step in height."""
+        """Make GNSS height the reference, without a step in height unless it is absolute."""
         f = self._f
         if f.flags.gps_hgt:
             return
         self._select('gnss')
-        if not f.gps_hgt_before:
+        if f.params.height.gnss_absolute:
+            self.offset = 0.0
+        elif not f.gps_hgt_before:
             altitude = 0.0 if f.fix is None else f.fix.altitude
             self.offset = altitude - f.earth.alt_ref + float(f.x[9])
 

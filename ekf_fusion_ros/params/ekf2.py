@@ -204,6 +204,9 @@ class HeightParams:
     reference: str = param('baro', 'Primary height source.', choices=HEIGHT_REFERENCES)
     wait_for_baro: bool = param(
         False, 'Do not start without barometric height, whatever the reference is.')
+    gnss_absolute: bool = param(
+        False, 'Let GNSS height as the reference be the altitude of the fixes. PX4 ties it to the '
+        'height it finds at the start instead, so that the error of one fix stays for good.')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
