@@ -61,9 +61,10 @@ class Gnss:
         origin_set = initialised and not f.earth.has_origin and self._checks.healthy
         if origin_set:
             self._set_origin(sample)
-        elif f.earth.field is None and sample.eph < 1000.0:
+        elif not f.earth.has_origin and sample.eph < 1000.0:
+            known_before = f.earth.field is not None
             f.earth.look_around(sample.lat, sample.lon, sample.time_us)
-            f.yaw_reset_requested |= f.params.mag.type != 'none'
+            f.yaw_reset_requested |= not known_before and f.params.mag.type != 'none'
         delay_us = round(f.params.gnss.delay_ms * 1000) + FILTER_PERIOD_US // 2
         self.buffer.push(sample.time_us - delay_us, self._to_local(sample))
         return origin_set
