@@ -95,6 +95,10 @@ def _bounds(axes: Any, flight: Comparison, axis: int, name: str) -> None:
     axes.fill_between(fused.time, -3.0 * sigma, 3.0 * sigma, color=FUSED, alpha=0.12, linewidth=0,
                       label='3 sigma of the filter')
     axes.plot(fused.time, fused.position[:, axis], color=FUSED, linewidth=1.0, label='fused')
+    # The outage would dwarf the rest: its bounds leave the picture.
+    usual = np.abs(np.append(3.0 * sigma[~inside(fused.time, (flight.outage,))],
+                             fused.position[:, axis]))
+    axes.set_ylim(-1.3 * usual.max(), 1.3 * usual.max())
     axes.set_title(f'fused error {name}')
     axes.set_ylabel('m')
     _finish(axes, flight)
