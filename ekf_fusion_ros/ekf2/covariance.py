@@ -57,7 +57,8 @@ class Covariance:
     ) -> None:
         """Propagate P over one filter period of nominal length.
 
-        imu (8,) raw increments; dt_avg mean filter period in s; climb_rate m/s scales the wind noise.
+        imu (8,) raw increments; dt_avg mean filter period in s; climb_rate m/s scales the wind
+        noise.
         """
         self._accel_bias_var_max = (0.1 * GRAVITY * dt_avg) ** 2
         velocity_var = self._accel_var

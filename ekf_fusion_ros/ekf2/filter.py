@@ -80,9 +80,9 @@ class Observations:
 class Filter:
     """The state of the estimator, shared by prediction, aid sources and resets.
 
-    `x` holds the 24 states in the order of state.py, `cov` owns their covariance. `rot` is the body
-    to earth matrix cached at the prediction; measurement updates do not refresh it, so that all
-    lever arms of one step use the same attitude.
+    `x` holds the 24 states in the order of state.py, `cov` owns their covariance. `rot` is the
+    body to earth matrix cached at the prediction; measurement updates do not refresh it, so that
+    all lever arms of one step use the same attitude.
     """
 
     def __init__(self, params: Ekf2Params, history: int) -> None:

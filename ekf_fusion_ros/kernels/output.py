@@ -1,8 +1,8 @@
 """Full-rate strapdown of the output predictor and its correction towards the filter.
 
-out (10,) is quaternion, velocity, position of the IMU; history (n, 10) the same for the last filter
-periods. A complementary filter: A. Khosravian et al., "Recursive attitude estimation in the presence of
-multi-rate and multi-delay vector measurements", 2015.
+out (10,) is quaternion, velocity, position of the IMU; history (n, 10) the same for the last
+filter periods. A complementary filter: A. Khosravian et al., "Recursive attitude estimation in the
+presence of multi-rate and multi-delay vector measurements", 2015.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ def propagate_output(
     """Advance out (10,) and rot (3, 3) by one raw IMU sample, in place.
 
     bias_scale turns biases per filter period into biases per raw sample; correction (3,) rad;
-    yaw (2,) accumulates the turn about the vertical and low-passes its rate; rate (3,) receives the
-    raw body rate.
+    yaw (2,) accumulates the turn about the vertical and low-passes its rate; rate (3,) receives
+    the raw body rate.
     """
     angle = np.empty(3)
     spin = 0.0
@@ -55,7 +55,7 @@ def propagate_output(
 
 @kernel
 def attitude_error(q: Array, oldest: Array) -> Array:
-    """Return the small rotation (3,) in rad that takes the oldest output to the filter attitude."""
+    """Return the small rotation (3,) in rad from the oldest output to the filter attitude."""
     w, x, y, z = q[0], -q[1], -q[2], -q[3]
     error = quat_normalise(quat_multiply(np.array((w, x, y, z)), oldest))
     scale = -2.0
@@ -71,9 +71,9 @@ def correct_output(
 ) -> None:
     """Compare the oldest entry of the history with the filter state x (24,), in place.
 
-    correction (3,) receives the attitude correction for each of the coming raw samples. Velocity and
-    position of the whole history move towards the filter (PI); integral (6,) of their errors. errors
-    (3,) receives the norms of the attitude, velocity and position errors.
+    correction (3,) receives the attitude correction for each of the coming raw samples. Velocity
+    and position of the whole history move towards the filter (PI); integral (6,) of their errors.
+    errors (3,) receives the norms of the attitude, velocity and position errors.
     """
     error = attitude_error(x[0:4], history[oldest, 0:4])
     correction[:] = error * att_gain

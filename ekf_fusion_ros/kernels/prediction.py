@@ -1,8 +1,8 @@
 """State and covariance prediction over one delayed inertial sample.
 
-State order: quaternion body to earth (0-3), velocity NED (4-6), position NED (7-9), delta-angle bias
-(10-12), delta-velocity bias (13-15), earth field (16-18), body field (19-21), wind NE (22-23).
-Process model (Sola 2017, section 4, with the quaternion itself as state):
+State order: quaternion body to earth (0-3), velocity NED (4-6), position NED (7-9), delta-angle
+bias (10-12), delta-velocity bias (13-15), earth field (16-18), body field (19-21), wind NE
+(22-23). Process model (Sola 2017, section 4, with the quaternion itself as state):
     q+ = q [1, (da - ba) / 2],   v+ = v + R(q) (dv - bv) + g dt,   p+ = p + v dt.
 """
 
@@ -156,12 +156,12 @@ def predict_covariance(
 ) -> None:
     """P <- F P F' + G Q G' + N in place.
 
-    p (24, 24); f (10, 24) scratch, zero where fill_transition does not write; x (24,) the predicted
-    state; imu (8,) the raw increments; angle_var rad^2 and velocity_var (3,) (m/s)^2 of the
-    increments; noise (24,) the additive process noise. inhibited (3,) marks accelerometer axes whose
-    bias is not estimated: they keep the saved (3,) variance and no correlation with states 0 to 15
-    (that with field and wind survives, as in the reference filter). Inactive magnetic and wind
-    blocks are zero.
+    p (24, 24); f (10, 24) scratch, zero where fill_transition does not write; x (24,) the
+    predicted state; imu (8,) the raw increments; angle_var rad^2 and velocity_var (3,) (m/s)^2 of
+    the increments; noise (24,) the additive process noise. inhibited (3,) marks accelerometer axes
+    whose bias is not estimated: they keep the saved (3,) variance and no correlation with states 0
+    to 15 (that with field and wind survives, as in the reference filter). Inactive magnetic and
+    wind blocks are zero.
     """
     fill_transition(x[0:4], imu[0:3] - x[10:13], imu[3:6] - x[13:16], NOMINAL_PERIOD, f)
     frozen = p[7, 7] + p[8, 8] > 1e4

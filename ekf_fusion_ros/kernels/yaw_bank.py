@@ -2,7 +2,8 @@
 
 Arrays hold one entry per model: rot (n, 3, 3) body to earth, bias (n, 3) rad/s, state (n, 3),
 cov (n, 3, 3), weight (n,). Complementary filter after R. Mahony et al., "Nonlinear complementary
-filters on the special orthogonal group", 2008; Gaussian sum after D. Alspach and H. Sorenson, 1972.
+filters on the special orthogonal group", 2008; Gaussian sum after D. Alspach and H. Sorenson,
+1972.
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ def combine_models(state: Array, cov: Array, weights: Array, out: Array) -> None
 def predict_attitudes(
     rot: Array, bias: Array, imu: Array, accel: Array, gain: float, airspeed: float,
 ) -> None:
-    """Turn every rot by the delta angle of imu (8,) and lean it towards the filtered accel (3,)."""
+    """Turn every rot by the delta angle of imu (8,), lean it to the filtered accel (3,)."""
     norm = math.sqrt(accel[0] ** 2 + accel[1] ** 2 + accel[2] ** 2)
     dt = imu[6]
     rate_dt = max(dt, 1e-3)
@@ -137,8 +138,8 @@ def correct_models(
 ) -> bool:
     """Fuse a NE velocity (2,) into every model; False if any S was singular.
 
-    density (n,) receives the likelihood of the unclipped innovation. The innovation is shortened to
-    5 sigma for the state correction.
+    density (n,) receives the likelihood of the unclipped innovation. The innovation is shortened
+    to 5 sigma for the state correction.
     """
     noise = max(accuracy, 0.01) ** 2
     good = True

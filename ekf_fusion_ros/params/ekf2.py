@@ -121,8 +121,9 @@ class GnssParams:
     pos_gate: float = param(5.0, 'Innovation gate of position.', unit='sigma', min=1, max=100,
                             px4='EKF2_GPS_P_GATE', ecl='gps_pos_innov_gate')
     correlation_time: float = param(
-        0.0, 'Correlation time of the position errors. The noise of a fix grows as if fixes inside '
-        'twice this time told as much as one; 0 = errors are white.', unit='s', min=0, max=300)
+        0.0, 'Correlation time of the position errors. The noise of a fix grows as if fixes '
+        'inside twice this time told as much as one; 0 = errors are white.', unit='s', min=0,
+        max=300)
     position: Vector = param(ZERO, 'Antenna position in the body frame (FRD).', unit='m',
                              ecl='gps_pos_body')
     checks: GnssCheckParams = field(default_factory=GnssCheckParams)
@@ -247,8 +248,8 @@ class AidingParams:
     yaw_drift: float = param(
         0.0, 'Random walk of yaw beside the gyro noise.', unit='rad/sqrt(s)', min=0, max=1)
     hold_yaw: bool = param(
-        True, 'Bound the yaw variance by a pseudo measurement while nothing measures yaw. Off, yaw '
-        'is left to what position and velocity tell.')
+        True, 'Bound the yaw variance by a pseudo measurement while nothing measures yaw. Off, '
+        'yaw is left to what position and velocity tell.')
     airspeed_delay_ms: float = param(100.0, 'Delay of the airspeed sensor.', unit='ms', min=0,
                                      max=300, px4='EKF2_ASP_DELAY', ecl='airspeed_delay_ms')
     airspeed_threshold: float = param(2.0, 'Airspeed above which it is used; 0 = never.',

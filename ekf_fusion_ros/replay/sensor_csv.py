@@ -1,7 +1,7 @@
 """Sensor CSV recordings: one row per message, in the order in which the filter gets them.
 
-`time_us,sensor,field,...`; the fields of each sensor are those of the constructors below. Time is in
-integer us; body axes FRD, earth axes NED.
+`time_us,sensor,field,...`; the fields of each sensor are those of the constructors below. Time is
+in integer us; body axes FRD, earth axes NED.
 """
 
 from __future__ import annotations
@@ -71,7 +71,8 @@ def _vio(time_us: int, v: Fields) -> Sample:
         xy, xz, yz = v[18:21]
         covariance = covariance + np.array(((0.0, xy, xz), (xy, 0.0, yz), (xz, yz, 0.0)))
     return VisionSample(
-        time_us, position=np.array(v[0:3]), quaternion=np.array(v[3:7]), velocity=np.array(v[7:10]),
+        time_us, position=np.array(v[0:3]), quaternion=np.array(v[3:7]),
+        velocity=np.array(v[7:10]),
         position_var=np.array(v[10:13]), velocity_cov=covariance, angular_var=v[16],
         velocity_frame=VelocityFrame(int(v[17])))
 

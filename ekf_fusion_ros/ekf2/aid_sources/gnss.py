@@ -1,4 +1,4 @@
-"""GNSS position and velocity: checked at arrival, started after health, watched, reset, stopped."""
+"""GNSS position and velocity: checked at arrival, started after health, reset, stopped."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Gnss:
                        sample.eph, sample.epv, sample.sacc, sample.has_velocity)
 
     def _set_origin(self, sample: GnssSample) -> None:
-        """Tie the local frame to the earth so that a position that is already in use stays valid."""
+        """Tie the local frame to the earth so that a position already in use stays valid."""
         f = self._f
         altitude = sample.alt
         if f.flags.aided_horizontally():
@@ -210,7 +210,7 @@ class Gnss:
         return f.late(newest, limit) or f.late(times.hor_pos, 2 * limit)
 
     def _recover_or_reset(self) -> None:
-        """Yaw from the EKF-GSF bank after a bad take-off, or position and velocity from the fix."""
+        """Yaw from the EKF-GSF bank after a bad take-off, else position, velocity from the fix."""
         f = self._f
         timed_out = self._aiding_timed_out()
         if self._recovery.step(timed_out, self._previous_fix_us, self._checks.healthy):

@@ -74,7 +74,7 @@ class Magnetometer:
             self.buffer.push(*mean)
 
     def pop(self) -> bool:
-        """Take the sample at the horizon into `field` and its low-pass; True when there was one."""
+        """Take the sample at the horizon into `field` and its low-pass; True if there was one."""
         popped = self.buffer.pop_first_older_than(self._f.t_horizon)
         if popped is None:
             return False

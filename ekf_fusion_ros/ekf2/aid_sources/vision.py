@@ -28,7 +28,7 @@ DATA_TIMEOUT_US = 7 * SECOND
 
 
 class Vision:
-    """Buffers samples, keeps the rotation between the odometry and the filter frame, steps parts."""
+    """Buffers samples, keeps the rotation from the odometry to the filter frame, steps parts."""
 
     def __init__(self, f: Filter, resets: Resets, heading: HeadingFusion, capacity: int) -> None:
         """Act on a filter through its resets and heading fusion."""

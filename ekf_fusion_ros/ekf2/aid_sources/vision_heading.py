@@ -1,4 +1,4 @@
-"""Heading of the odometry frame, found from motion: aligns yaw, or corrects it when it was wrong."""
+"""Heading of the odometry frame, found from motion: aligns yaw, or corrects a wrong one."""
 
 from __future__ import annotations
 

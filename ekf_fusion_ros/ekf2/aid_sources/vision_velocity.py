@@ -1,4 +1,4 @@
-"""Velocity from odometry: starts with a reset, fuses, resets after a time-out, stops with the data."""
+"""Velocity from odometry: starts with a reset, resets after a time-out, stops with the data."""
 
 from __future__ import annotations
 

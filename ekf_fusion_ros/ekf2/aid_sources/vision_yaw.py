@@ -1,4 +1,4 @@
-"""Yaw from odometry whose frame is the filter's frame: starts with a reset and stops the compass."""
+"""Yaw from odometry in the filter's frame: starts with a reset and stops the compass."""
 
 from __future__ import annotations
 
