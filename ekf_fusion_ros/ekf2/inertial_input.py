@@ -33,7 +33,9 @@ class InertialInput:
         self.min_interval_us = 0
         self.vibration = np.zeros(3)
         self.at_rest = False
+        self.quiet = False
         self._last_move_us = 0
+        self._last_vibration_us = 0
         self._previous = np.zeros(6)
         self._quat = np.array((1.0, 0.0, 0.0, 0.0))
         self._velocity = np.zeros(3)
@@ -53,7 +55,8 @@ class InertialInput:
             self._period, self._previous, self.vibration)
         self._detect_rest(sample, dt, in_air)
         if any(sample.clipping):
-            x, y, z = (bool(a or b) for a, b in zip(self._clipping, sample.clipping))
+            x, y, z = (
+                bool(a or b) for a, b in zip(self._clipping, sample.clipping, strict=True))
             self._clipping = (x, y, z)
         if not complete:
             return False
@@ -68,12 +71,14 @@ class InertialInput:
         scale = self._moving_scaler
         angle = sample.delta_angle
         moving = (
-            in_air
-            or self.vibration[1] > ANGLE_VIBRATION_LIMIT * scale
+            self.vibration[1] > ANGLE_VIBRATION_LIMIT * scale
             or self.vibration[2] > VELOCITY_VIBRATION_LIMIT * scale
             or angle.dot(angle) > (RATE_LIMIT * scale * dt) ** 2)
         if moving:
+            self._last_vibration_us = sample.time_us
+        if moving or in_air:
             self._last_move_us = sample.time_us
+        self.quiet = sample.time_us - self._last_vibration_us > REST_TIME_US
         self.at_rest = sample.time_us - self._last_move_us > REST_TIME_US
 
 

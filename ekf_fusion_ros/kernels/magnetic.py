@@ -40,7 +40,8 @@ def field_jacobian(x: Array, axis: int, h: Array) -> float:
     h[16 + k] -= 2.0 * q0 * v[j]
     h[16 + j] += 2.0 * q0 * v[k]
     h[19 + axis] = 1.0
-    return (q0 * q0 - vv) * m[axis] + 2.0 * v[axis] * vm - 2.0 * q0 * cross + x[19 + axis]
+    rotated = (q0 * q0 - vv) * m[axis] + 2.0 * v[axis] * vm - 2.0 * q0 * cross
+    return float(rotated + x[19 + axis])
 
 
 @kernel
