@@ -114,6 +114,9 @@ class Estimator(Protocol):
     def aid_statuses(self) -> Sequence[AidStatus]:
         """Return one record per kind of observation seen so far."""
 
+    def reset_counts(self) -> Mapping[str, int]:
+        """Return how often each part of the state has jumped since the start."""
+
     def drain_events(self) -> Sequence[Event]:
         """Return and forget the events since the last call."""
 

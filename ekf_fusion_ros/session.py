@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from collections.abc import Collection
 from collections.abc import Mapping
@@ -78,6 +79,8 @@ class FusionSession:
         self._rate_mhz = round(1000 * self.params.session.output_rate)
         self._last_altitude = 0.0
         self.restarts = 0
+        self._resets_before: Counter[str] = Counter()
+        self._home: GeoPoint | None = None
         self.milestones: dict[str, int] = {}
         self._forget()
 
@@ -209,7 +212,8 @@ class FusionSession:
     def _aid(self, role: str, sample: Any) -> None:
         """Hand an aiding sample to the estimator and to what looks for yaw in motion."""
         if role == FIX_VELOCITY:
-            self._push_fixes(self._paired().push_velocity(sample))
+            assert self._pairing is not None
+            self._push_fixes(self._pairing.push_velocity(sample))
         elif role == FIX:
             self._push_fixes(self._pairing.push_fix(sample) if self._pairing else [sample])
         elif role == ODOMETRY:
@@ -239,10 +243,6 @@ class FusionSession:
         if heading is not None:
             self._estimator.push(heading)
 
-    def _paired(self) -> FixPairing:
-        assert self._pairing is not None
-        return self._pairing
-
     # -- time --------------------------------------------------------------------------------
 
     def _run(self, role: str, reading: Any) -> list[FusedOutput]:
@@ -253,13 +253,14 @@ class FusionSession:
         if role == ODOMETRY:
             self._push_odometry(reading)
         for imu in increments:
-            if self._now_us is None and self.params.session.assume_in_air:
-                self._estimator.push(LandedSample(imu.time_us, landed=False))
+            first = self._now_us is None
             for due in self._holding.release(imu.time_us):
                 self._aid(*due)
             if self._pairing is not None:
                 self._push_fixes(self._pairing.advance(imu.time_us))
             outputs += self._advance(imu)
+            if first and self.params.session.assume_in_air:
+                self._estimator.push(LandedSample(imu.time_us, landed=False))
         return outputs
 
     def _advance(self, imu: ImuSample) -> list[FusedOutput]:
@@ -279,10 +280,22 @@ class FusionSession:
         if nav is None:
             return []
         self._note_milestones(nav)
-        if not self._local and (nav.origin is None or not nav.yaw_aligned):
-            return []
+        if not self._local:
+            nav = self._at_home(nav)
+            if nav is None or not nav.yaw_aligned:
+                return []
         fixes, self._fixes = tuple(self._fixes), []
         return [FusedOutput(nav, self._local, fixes)]
+
+    def _at_home(self, nav: NavState) -> NavState | None:
+        """Return the state about the first origin, which restarts keep; None without one."""
+        if nav.origin is None:
+            return None
+        if self._home is None:
+            self._home = nav.origin
+        if nav.origin != self._home and self._estimator.set_origin(self._home):
+            return self._estimator.nav_state()
+        return nav
 
     def _note_milestones(self, nav: NavState) -> None:
         """Keep when the filter started, when its yaw was aligned and when the origin was set."""
@@ -298,6 +311,7 @@ class FusionSession:
         self.restarts += 1
         self.finish()
         self._collect()
+        self._resets_before.update(self._estimator.reset_counts())
         self._estimator.reset()
         self._forget()
 
@@ -321,7 +335,10 @@ class FusionSession:
 
     def set_origin(self, origin: GeoPoint) -> bool:
         """Move the origin of the map frame; False where the point is unusable."""
-        return self._estimator.set_origin(origin)
+        moved = self._estimator.set_origin(origin)
+        if moved:
+            self._home = origin
+        return moved
 
     def reset(self) -> None:
         """Start again with the same parameters; counts and events go on."""
@@ -345,7 +362,9 @@ class FusionSession:
 
     def resets(self) -> dict[str, int]:
         """Return how often each part of the state has jumped, and the session restarted."""
-        counts = getattr(self._estimator, 'reset_counts', dict)()
+        now = Counter(self._estimator.reset_counts())
+        names = [*now, *self._resets_before]
+        counts = {name: now[name] + self._resets_before[name] for name in names}
         return {**counts, 'restarts': self.restarts}
 
     def drain_events(self) -> list[Event]:
@@ -358,21 +377,16 @@ class FusionSession:
         """Say in one sentence what the session is doing or waiting for."""
         health = self._estimator.health()
         waiting = self._waiting_for()
-        if not waiting:
-            return health
-        level = max(health.level, HealthLevel.WARN)
-        return Health(level, waiting, health.values)
+        return replace(health, text=waiting, level=max(health.level, HealthLevel.WARN)) \
+            if waiting else health
 
     def _waiting_for(self) -> str:
         if self.roles is None:
             return ''
         needed = [self._inertial_role] + ([] if self._local else [FIX])
         for role in needed:
-            statistics = self._statistics[role]
-            if statistics.accepted == 0:
-                reasons = ', '.join(f'{n} {reason}' for reason, n in statistics.refused.items())
-                return (f'waiting for {role}: {statistics.received} received, none accepted'
-                        + (f' ({reasons})' if reasons else ''))
+            if self._statistics[role].accepted == 0:
+                return f'waiting for {role}: {self._statistics[role].summary()}'
         nav = self._estimator.nav_state()
         aligned = nav is not None and nav.yaw_aligned
         return '' if aligned or self._motion is None else self._motion.status().text

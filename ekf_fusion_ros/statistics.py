@@ -37,6 +37,12 @@ class RoleStatistics:
         """Messages received and not yet judged."""
         return self.received - self.accepted - self.refused_total
 
+    def summary(self) -> str:
+        """Say in words what became of the messages."""
+        reasons = ', '.join(f'{count} {reason}' for reason, count in self.refused.items())
+        taken = f'{self.accepted} accepted' if self.accepted else 'none accepted'
+        return f'{self.received} received, {taken}' + (f' ({reasons})' if reasons else '')
+
     def as_dict(self) -> dict[str, object]:
         """Return the counts as plain types, for summary.json and diagnostics."""
         return {

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ekf_fusion_ros.ekf2.alignment import Alignment
 from ekf_fusion_ros.ekf2.control import Control
 from ekf_fusion_ros.ekf2.filter import Filter
+from ekf_fusion_ros.ekf2.ground_contact import GroundContact
 from ekf_fusion_ros.ekf2.inertial_input import InertialInput
 from ekf_fusion_ros.ekf2.inertial_input import buffer_lengths
 from ekf_fusion_ros.ekf2.learning import AccelBiasLearning
@@ -65,6 +66,7 @@ class Ekf2:
         self._alignment = Alignment(self.filter, self.control.mag, self.control.baro,
                                     self.control.height, self._observation_length)
         self._learning = AccelBiasLearning(self.filter)
+        self._ground_contact = GroundContact(self.filter)
         self._raw: ImuSample | None = None
         self._period_complete = False
         self.initialised = False
@@ -86,7 +88,7 @@ class Ekf2:
         elif isinstance(sample, HeadingSample):
             self.control.vision.heading.push(sample)
         elif isinstance(sample, LandedSample):
-            self._set_landed(sample)
+            self._ground_contact.tell(sample)
 
     def update(self) -> bool:
         """Process the pushed ImuSample; True when the filter advanced by a period."""
@@ -99,6 +101,7 @@ class Ekf2:
         if complete:
             self._period_complete = False
             self._predict()
+            self._ground_contact.step(self.inertial.quiet)
             self.control.step()
         f = self.filter
         f.output.propagate(raw, f.x, f.dt_imu_avg, f.dt_avg)
@@ -124,16 +127,6 @@ class Ekf2:
         origin_set = self.control.gnss.push(sample, interval, self.initialised)
         if origin_set and self.params.height.reference == 'gnss':
             self.control.height.start_gnss()
-
-    def _set_landed(self, sample: LandedSample) -> None:
-        f = self.filter
-        f.flags.in_air = not sample.landed
-        f.flags.fixed_wing = sample.fixed_wing
-        f.flags.fuse_beta = sample.fuse_beta and not sample.landed
-        if sample.landed:
-            f.last_on_ground_us = f.t_now
-        else:
-            f.last_in_air_us = f.t_now
 
     def _initialise(self) -> bool:
         ring = self.inertial.ring
@@ -171,6 +164,13 @@ class Ekf2:
     def aid_statuses(self) -> Sequence[AidStatus]:
         """Return one record per kind of observation that was ever tried."""
         return [o.status() for o in self.filter.observations.all() if o.judged or o.starts]
+
+    def reset_counts(self) -> dict[str, int]:
+        """Return how often attitude, velocity and position have jumped."""
+        counters = self.control.resets.counters
+        return {'attitude': counters.quat, 'velocity_ne': counters.vel_ne,
+                'velocity_d': counters.vel_d, 'position_ne': counters.pos_ne,
+                'position_d': counters.pos_d}
 
     def drain_events(self) -> Sequence[Event]:
         """Return and forget the events since the last call."""

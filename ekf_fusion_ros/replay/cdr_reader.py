@@ -210,7 +210,8 @@ def _nav_sat_fix(data: bytes) -> NavSatFix:
     service, = struct.unpack_from('<H', data, at)
     at = _aligned(at + 2, 8)
     v = _DOUBLES[12](data, at)
-    return NavSatFix(header, NavSatStatus(status, service), *v[0:3], v[3:12], data[at + 96])
+    return NavSatFix(
+        header, NavSatStatus(status, service), v[0], v[1], v[2], v[3:12], data[at + 96])
 
 
 def _twist_stamped(data: bytes) -> TwistStamped:

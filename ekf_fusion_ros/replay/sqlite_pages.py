@@ -38,8 +38,8 @@ class _Pages:
 
     def __init__(self, data: Any) -> None:
         size, = struct.unpack('>H', data[16:18])
-        self._size = 65536 if size == 1 else max(size, 512)
-        self._usable = self._size - data[20]
+        self._size: int = 65536 if size == 1 else max(size, 512)
+        self._usable: int = self._size - data[20]
         self._data = data
         self.count = len(data) // self._size
 
@@ -90,7 +90,7 @@ class _Pages:
 
 
 def _varint(data: bytes, at: int) -> tuple[int, int]:
-    value = 0
+    value: int = 0
     for step in range(8):
         byte = data[at + step]
         value = value << 7 | byte & 0x7F
@@ -119,7 +119,7 @@ def _columns(payload: bytes) -> list[Any]:
 
 def _size_of(kind: int) -> int:
     if kind >= 12:
-        return (kind - 12) // 2
+        return int(kind - 12) // 2
     return 8 if kind == 7 else INTEGER_SIZES.get(kind, 0)
 
 

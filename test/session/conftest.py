@@ -50,6 +50,9 @@ class RecordingEstimator:
     def aid_statuses(self):
         return []
 
+    def reset_counts(self):
+        return {'attitude': 2}
+
     def drain_events(self):
         return [Event(0, 'reset')] if self.resets == 1 else []
 

@@ -233,6 +233,19 @@ def test_bag_loop_restarts_the_estimator_once(build, estimator):
     assert_exact(session)
 
 
+def test_restart_keeps_the_first_origin(build, estimator):
+    session = session_of(estimator, 'imu', 'fix')
+    session.handle('fix', build.fix(START, lat=47.0))
+    run_imu(session, build, START, START + 20)
+    session.handle('imu', build.imu(START))
+    run_imu(session, build, START + 0.01, START + 1)
+    session.handle('fix', build.fix(START + 1, lat=47.001))
+    outputs = run_imu(session, build, START + 1.01, START + 2)
+    assert estimator.resets == 1
+    assert outputs[-1].nav.origin.lat == 47.0
+    assert session.resets() == {'attitude': 4, 'restarts': 1}
+
+
 def test_one_wild_inertial_stamp_restarts_nothing(build, estimator):
     session = session_of(estimator, 'imu', 'fix')
     run_imu(session, build, START, START + 1)
