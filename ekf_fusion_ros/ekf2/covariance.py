@@ -41,6 +41,7 @@ class Covariance:
         dt = FILTER_PERIOD
         self._angle_var = (dt * min(imu.gyro_noise, 1.0)) ** 2
         self._accel_var = np.full(3, (dt * min(imu.accel_noise, 1.0)) ** 2)
+        self._stated_accel_var = self._accel_var
         self._bad_accel_var = np.full(3, (dt * BAD_ACCEL_NOISE) ** 2)
         self._noise = np.zeros(SIZE)
         self._noise[10:13] = (dt * dt * imu.gyro_bias_process_noise) ** 2
@@ -78,6 +79,11 @@ class Covariance:
         if self._yaw_drift_var > 0.0:
             self.add_yaw_variance(x[0:4], self._yaw_drift_var)
         self._limit()
+
+    def scale_accel_noise(self, factor: float) -> None:
+        """Multiply the accelerometer variance, between what is stated and what clipping gets."""
+        self._accel_var = np.clip(self._accel_var * factor, self._stated_accel_var,
+                                  self._bad_accel_var)
 
     def inhibit_accel_bias(self, axis: int, inhibit: bool) -> None:
         """Freeze or release the estimation of one accelerometer bias, keeping its variance."""

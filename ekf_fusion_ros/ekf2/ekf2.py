@@ -45,8 +45,8 @@ class Ekf2:
     """Attitude, velocity, position, sensor biases, magnetic field and wind from many sensors.
 
     Measurements wait in buffers until the fusion horizon, which lags now by the largest sensor
-    delay, has passed them. The horizon advances with the inertial data; the output predictor carries
-    its state to now.
+    delay, has passed them. The horizon advances with the inertial data; the output predictor
+    carries its state to now.
     """
 
     def __init__(self, params: Ekf2Params | None = None) -> None:

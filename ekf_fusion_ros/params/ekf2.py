@@ -63,6 +63,9 @@ class ImuParams:
     accel_bias_learn_time: float = param(
         0.5, 'Decay time of the manoeuvre level that inhibits bias learning.', unit='s',
         min=0.05, max=10, px4='EKF2_ABL_TAU', ecl='acc_bias_learn_tc')
+    adapt_accel_noise: bool = param(
+        True, 'Raise the accelerometer noise while GNSS velocity shows that it is larger than '
+        'stated.')
     inhibit_accel_bias: bool = param(False, 'Do not estimate accelerometer biases.')
     moving_scaler: float = param(
         1.0, 'Scale of the thresholds of the at-rest detection.', min=0.1, max=10,
@@ -240,6 +243,9 @@ class AidingParams:
                                    ecl='pos_noaid_noise')
     valid_timeout: float = param(5.0, 'Dead reckoning after which the output is not valid.',
                                  unit='s', min=0.5, max=600, px4='EKF2_NOAID_TOUT')
+    infer_in_air: bool = param(
+        True, 'Take a moving vehicle to be in the air, one at rest to be on the ground, until a '
+        'landed sample says which.')
     reset_timeout: float = param(7.0, 'Time without accepted aiding before a reset.', unit='s',
                                  min=1, max=60)
     position_drift: float = param(

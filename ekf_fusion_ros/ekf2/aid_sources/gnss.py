@@ -18,6 +18,7 @@ from ekf_fusion_ros.ekf2.state import FILTER_PERIOD_US
 from ekf_fusion_ros.ekf2.state import SECOND
 from ekf_fusion_ros.ekf2.yaw_recovery import YawRecovery
 from ekf_fusion_ros.estimator import GeoPoint
+from ekf_fusion_ros.mathlib.rotation import cross
 from ekf_fusion_ros.samples import GnssSample
 
 Array = NDArray[np.float64]
@@ -26,6 +27,8 @@ VERTICAL_NOISE_RATIO = 1.5
 DATA_TIMEOUT_US = 10 * SECOND
 DATA_TIMEOUT_AIDED_US = 1 * SECOND
 INTERMITTENT_US = 1 * SECOND
+NIS_DECAY = 0.95
+"""Factor per fix by which raised accelerometer variance falls back."""
 
 
 class Gnss:
@@ -233,7 +236,7 @@ class Gnss:
         arm = f.rot @ lever
         f.fix = f.fix._replace(
             position=f.fix.position - arm[0:2], altitude=f.fix.altitude + float(arm[2]),
-            velocity=f.fix.velocity - f.rot @ np.cross(f.rate, lever), sacc=sacc)
+            velocity=f.fix.velocity - f.rot @ cross(f.rate, lever), sacc=sacc)
 
     def _fuse(self) -> None:
         f = self._f
@@ -249,6 +252,7 @@ class Gnss:
                                      (noise, noise), params.vel_gate)
             fuse_vertical_velocity(f, f.observations.gps_ver_vel, velocity_innovation[2],
                                    noise * VERTICAL_NOISE_RATIO ** 2, params.vel_gate)
+            self._adapt_accel_noise()
         noise = self._position_sigma(fix.hacc) ** 2 * self._repetition(fix.time_us)
         fuse_horizontal_position(f, f.observations.gps_hor_pos, position_innovation,
                                  (noise, noise), params.pos_gate,
@@ -263,6 +267,24 @@ class Gnss:
         tau = self._f.params.gnss.correlation_time
         interval = max(time_us - self._previous_fix_us, 1) / SECOND
         return max(1.0, 2.0 * tau / interval)
+
+    def _adapt_accel_noise(self) -> None:
+        """Let the accelerometer noise follow the innovations of the velocity.
+
+        Innovation-based adaptive estimation (R. K. Mehra, "Approaches to adaptive filtering",
+        1972): in a consistent filter the normalised innovation squared is 1 in the mean. More of it
+        tells that the inertial data are worse than stated (vibration, lag, stamps): the noise
+        rises at once and falls back slowly.
+        """
+        f = self._f
+        if not f.params.imu.adapt_accel_noise:
+            return
+        seen = f.observations
+        squares = [
+            i * i / v for record in (seen.gps_hor_vel, seen.gps_ver_vel)
+            for i, v in zip(record.innovation, record.variance, strict=True)]
+        excess = sum(squares) / len(squares)
+        f.cov.scale_accel_noise(excess if excess > 1.0 else NIS_DECAY)
 
     def _position_sigma(self, hacc: float) -> float:
         """Bound the claimed accuracy; a sole source may not be distrusted without limit."""
