@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ekf_fusion_ros.kernels.output import correct_output
 from ekf_fusion_ros.kernels.output import propagate_output
+from ekf_fusion_ros.mathlib.rotation import cross
 from ekf_fusion_ros.mathlib.rotation import quat_multiply
 from ekf_fusion_ros.params.ekf2 import OutputParams
 from ekf_fusion_ros.samples import ImuSample
@@ -60,7 +61,7 @@ class OutputPredictor:
 
     def velocity_at_origin(self, imu_position: Array) -> Array:
         """Return the velocity (3,) of the body origin, given the IMU position (3,) in the body."""
-        velocity: Array = self.now[4:7] - self.rot @ np.cross(self.rate, imu_position)
+        velocity: Array = self.now[4:7] - self.rot @ cross(self.rate, imu_position)
         return velocity
 
     def position_at_origin(self, imu_position: Array) -> Array:

@@ -11,6 +11,7 @@ from ekf_fusion_ros.ekf2.state import PD
 from ekf_fusion_ros.ekf2.state import PN
 from ekf_fusion_ros.ekf2.state import VD
 from ekf_fusion_ros.ekf2.state import VN
+from ekf_fusion_ros.mathlib.rotation import cross
 from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
 from ekf_fusion_ros.mathlib.rotation import quat_from_matrix
 from ekf_fusion_ros.mathlib.rotation import quat_inverse
@@ -198,7 +199,7 @@ def vision_velocity_in_filter_frame(f: Filter, sample: VisionSample) -> tuple[Ar
     Removes the lever arm of the sensor with the delayed rate.
     """
     lever = np.subtract(f.params.vision.position, f.params.imu.position)
-    swing = np.cross(f.rate, lever)
+    swing = cross(f.rate, lever)
     if sample.velocity_frame is VelocityFrame.BODY_FRD:
         return (f.rot @ (sample.velocity - swing),
                 f.rot @ sample.velocity_cov @ f.rot.T)

@@ -163,6 +163,12 @@ def with_yaw(rot: Array, yaw: float) -> Array:
     return matrix_from_euler_312(roll, pitch, yaw)
 
 
+def cross(a: Array, b: Array) -> Array:
+    """Return the vector product a x b, (3,); numpy's takes twenty times as long."""
+    return np.array((a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+                     a[0] * b[1] - a[1] * b[0]))
+
+
 def cross_matrix(v: Array) -> Array:
     """Return the matrix [v x], (3, 3)."""
     return np.array(((0.0, -v[2], v[1]), (v[2], 0.0, -v[0]), (-v[1], v[0], 0.0)))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.fusion import test_ratio
 from ekf_fusion_ros.ekf2.observation import Observation
+from ekf_fusion_ros.mathlib.rotation import cross
 from ekf_fusion_ros.mathlib.rotation import cross_matrix
 from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
 
@@ -23,7 +24,7 @@ def body_velocity_jacobian(q: Array, velocity: Array) -> Array:
     """
     w, u = q[0], q[1:4]
     jacobian = np.empty((3, 4))
-    jacobian[:, 0] = 2.0 * (w * velocity - np.cross(u, velocity))
+    jacobian[:, 0] = 2.0 * (w * velocity - cross(u, velocity))
     jacobian[:, 1:4] = 2.0 * (
         np.outer(u, velocity) - np.outer(velocity, u) + (u @ velocity) * np.eye(3)
         + w * cross_matrix(velocity))
