@@ -272,8 +272,8 @@ class Gnss:
         """Let the accelerometer noise follow the innovations of the velocity.
 
         Innovation-based adaptive estimation (R. K. Mehra, "Approaches to adaptive filtering",
-        1972): in a consistent filter the normalised innovation squared is 1 in the mean. More of it
-        tells that the inertial data are worse than stated (vibration, lag, stamps): the noise
+        1972): in a consistent filter the normalised innovation squared is 1 in the mean. More of
+        it tells that the inertial data are worse than stated (vibration, lag, stamps): the noise
         rises at once and falls back slowly.
         """
         f = self._f
