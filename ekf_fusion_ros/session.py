@@ -42,6 +42,7 @@ from ekf_fusion_ros.stamp_order import AidingOrder
 from ekf_fusion_ros.stamp_order import InertialOrder
 from ekf_fusion_ros.stamp_order import Step
 from ekf_fusion_ros.statistics import RoleStatistics
+from ekf_fusion_ros.statistics import note_milestones
 
 if TYPE_CHECKING:
     from ekf_fusion_ros.params.tree import Params
@@ -183,10 +184,12 @@ class FusionSession:
             return
         before = self._inertial_order.last
         step = self._inertial_order.judge(time_us)
+        gap = 0.0 if before is None else (time_us - before) / SECOND_US
+        if step is Step.FORWARD and gap > self.params.session.gap_notice:
+            self._tell(time_us, f'no {role} message for {gap:.3f} s')
         if step is Step.RESTART:
-            assert before is not None
-            self._tell(time_us, f'the stamps of {role} jumped by {(time_us - before) / 1e6:+.3f} '
-                       's: the estimator starts again')
+            self._tell(time_us, f'the stamps of {role} jumped by {gap:+.3f} s: the estimator '
+                       'starts again')
             self._restart()
             self._inertial_order.judge(time_us)
 
@@ -279,7 +282,7 @@ class FusionSession:
         nav = self._estimator.nav_state()
         if nav is None:
             return []
-        self._note_milestones(nav)
+        note_milestones(self.milestones, nav)
         if not self._local:
             nav = self._at_home(nav)
             if nav is None or not nav.yaw_aligned:
@@ -296,16 +299,6 @@ class FusionSession:
         if nav.origin != self._home and self._estimator.set_origin(self._home):
             return self._estimator.nav_state()
         return nav
-
-    def _note_milestones(self, nav: NavState) -> None:
-        """Keep when the filter started, when its yaw was aligned and when the origin was set."""
-        if len(self.milestones) == 3:
-            return
-        self.milestones.setdefault('filter', nav.time_us)
-        if nav.yaw_aligned:
-            self.milestones.setdefault('yaw', nav.time_us)
-        if nav.origin is not None:
-            self.milestones.setdefault('origin', nav.time_us)
 
     def _restart(self) -> None:
         self.restarts += 1

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from dataclasses import field
 
+from ekf_fusion_ros.estimator import NavState
+
 
 @dataclass(slots=True)
 class RoleStatistics:
@@ -50,3 +52,14 @@ class RoleStatistics:
             'accepted': self.accepted,
             'refused': dict(sorted(self.refused.items())),
         }
+
+
+def note_milestones(milestones: dict[str, int], nav: NavState) -> None:
+    """Keep when the filter started, its yaw was aligned and its origin set, each once."""
+    if len(milestones) == 3:
+        return
+    milestones.setdefault('filter', nav.time_us)
+    if nav.yaw_aligned:
+        milestones.setdefault('yaw', nav.time_us)
+    if nav.origin is not None:
+        milestones.setdefault('origin', nav.time_us)

@@ -33,6 +33,9 @@ class SessionParams:
     stamp_gap_max: float = param(
         5.0, 'Step of the inertial stamps above which the estimator starts again, once a second '
         'message confirms it.', unit='s', min=0.5, max=60)
+    gap_notice: float = param(
+        0.5, 'Gap in the inertial stamps above which it is told as an event.', unit='s',
+        min=0.01, max=60)
     stamp_lead_max: float = param(
         2.0, 'Time by which an aiding stamp may lie ahead of the inertial stamps.', unit='s',
         min=0.1, max=60)

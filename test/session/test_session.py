@@ -233,6 +233,14 @@ def test_bag_loop_restarts_the_estimator_once(build, estimator):
     assert_exact(session)
 
 
+def test_a_gap_in_the_inertial_input_is_told(build, estimator):
+    session = session_of(estimator, 'imu', 'fix')
+    run_imu(session, build, START, START + 1)
+    run_imu(session, build, START + 2, START + 3)
+    assert [event.text for event in session.drain_events()] == ['no imu message for 1.000 s']
+    assert estimator.resets == 0
+
+
 def test_restart_keeps_the_first_origin(build, estimator):
     session = session_of(estimator, 'imu', 'fix')
     session.handle('fix', build.fix(START, lat=47.0))
