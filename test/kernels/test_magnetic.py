@@ -1,0 +1,79 @@
+"""Magnetic field in the body: gradient by differences, update by the information form."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import settings
+import numpy as np
+from oracles import conjugate
+from oracles import covariance
+from oracles import difference
+from oracles import quaternions
+from oracles import sandwich
+from oracles import seeds
+from oracles import vectors
+import pytest
+
+from ekf_fusion_ros.kernels.magnetic import field_jacobian
+from ekf_fusion_ros.kernels.magnetic import fuse_field_axis
+from ekf_fusion_ros.kernels.magnetic import predict_field
+
+NOISE = 0.05 ** 2
+NO_AXIS = np.zeros(3)
+
+
+def field_in_body(x):
+    return sandwich(conjugate(x[0:4]), x[16:19]) + x[19:22]
+
+
+def state(q, earth, body):
+    x = np.zeros(24)
+    x[0:4], x[16:19], x[19:22] = q, earth, body
+    return x
+
+
+@settings(deadline=None, max_examples=40)
+@given(q=quaternions(), earth=vectors(3, 0.6), body=vectors(3, 0.1))
+def test_gradient_of_each_axis(q, earth, body):
+    x, h = state(q, earth, body), np.full(24, np.nan)
+    expected = difference(field_in_body, x, 1e-2)
+    for axis in range(3):
+        assert field_jacobian(x, axis, h) == pytest.approx(field_in_body(x)[axis], abs=1e-14)
+        np.testing.assert_allclose(h, expected[axis], atol=1e-12)
+
+
+@settings(deadline=None, max_examples=20)
+@given(seed=seeds(), q=quaternions(), measured=vectors(3, 0.5))
+def test_innovation_and_its_variance(seed, q, measured):
+    x, p = state(q, np.array((0.2, 0.05, 0.43)), np.array((0.02, -0.01, 0.0))), covariance(seed)
+    innovation, variance = np.empty(3), np.empty(3)
+    predict_field(x, p, measured, NOISE, innovation, variance)
+    h = difference(field_in_body, x, 1e-2)
+    np.testing.assert_allclose(innovation, field_in_body(x) - measured, atol=1e-14)
+    np.testing.assert_allclose(variance, np.diag(h @ p @ h.T) + NOISE, rtol=1e-9)
+
+
+@pytest.mark.parametrize('axis', [0, 1, 2])
+def test_update_is_that_of_the_information_form(axis):
+    x = state(np.array((0.5, 0.1, -0.3, 0.8)) / np.linalg.norm((0.5, 0.1, -0.3, 0.8)),
+              np.array((0.2, 0.05, 0.43)), np.array((0.02, -0.01, 0.0)))
+    p, before, variance = covariance(11), x.copy(), np.zeros(3)
+    h = difference(field_in_body, x, 1e-2)[axis]
+    expected = np.linalg.inv(np.linalg.inv(p) + np.outer(h, h) / NOISE)
+    gain = expected @ h / NOISE
+    out = p.copy()
+    assert fuse_field_axis(x, out, axis, 0.03, NOISE, True, NO_AXIS, 1.0, True, variance) == 0
+    np.testing.assert_allclose(out, expected, rtol=1e-6, atol=1e-10)
+    moved = before - 0.03 * gain
+    moved[0:4] /= np.linalg.norm(moved[0:4])
+    np.testing.assert_allclose(x, moved, atol=1e-10)
+    assert variance[axis] == pytest.approx(h @ p @ h + NOISE)
+
+
+def test_young_field_states_take_all_of_the_correction():
+    x = state(np.array((1.0, 0.0, 0.0, 0.0)), np.array((0.2, 0.0, 0.43)), np.zeros(3))
+    before = x.copy()
+    fuse_field_axis(x, covariance(5), 0, 0.03, NOISE, False, NO_AXIS, 1.0, True, np.zeros(3))
+    np.testing.assert_allclose(x[0:16], before[0:16], atol=1e-15)
+    np.testing.assert_array_equal(x[22:24], before[22:24])
+    assert abs(x[16] - before[16]) > 1e-4
