@@ -53,7 +53,7 @@ class FixMessageParams:
     mount_xyz: Vector = param(
         ZERO, 'Position of the antenna in the body frame (FLU, REP-103).', unit='m')
     default_eph: float = param(
-        2.5, 'Horizontal accuracy of a fix of unknown covariance.', unit='m', min=0.01, max=1000)
+        1.0, 'Horizontal accuracy of a fix of unknown covariance.', unit='m', min=0.01, max=1000)
     default_epv: float = param(
         4.0, 'Vertical accuracy of a fix of unknown covariance.', unit='m', min=0.01, max=1000)
     min_eph: float = param(

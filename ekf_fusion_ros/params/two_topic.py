@@ -38,10 +38,10 @@ class MotionHeadingParams:
     interval: float = param(
         1.0, 'Fixes inside this time are averaged to one point.', unit='s', min=0.05, max=10)
     window_time: float = param(
-        20.0, 'Time span of the fit; longer while the path in it is short.', unit='s', min=2,
+        18.0, 'Time span of the fit; longer while the path in it is short.', unit='s', min=2,
         max=600)
     window_path: float = param(
-        20.0, 'Path that the fit spans at least, if the longest time allows.', unit='m', min=1,
+        18.0, 'Path that the fit spans at least, if the longest time allows.', unit='m', min=1,
         max=1000)
     window_time_max: float = param(
         90.0, 'Longest time span of the fit.', unit='s', min=5, max=600)
@@ -58,7 +58,7 @@ class MotionHeadingParams:
     announce_sigma: float = param(
         0.2, 'Heading sigma below which the heading is announced.', unit='rad', min=0.01, max=1)
     refine_sigma: float = param(
-        0.085, 'Heading sigma below which the heading is announced a second time.', unit='rad',
+        0.0785, 'Heading sigma below which the heading is announced a second time.', unit='rad',
         min=0, max=1)
     watch_gate: float = param(
         5.0, 'Contradiction between the fit and the heading in use that makes the fit win.',

@@ -12,9 +12,12 @@ from ekf_fusion_ros.ekf2.filter import GnssFix
 from ekf_fusion_ros.ekf2.fusion import fuse_horizontal_position
 from ekf_fusion_ros.ekf2.fusion import fuse_horizontal_velocity
 from ekf_fusion_ros.ekf2.fusion import fuse_vertical_velocity
+from ekf_fusion_ros.ekf2.fusion import test_ratio
 from ekf_fusion_ros.ekf2.gnss_checks import GnssChecks
 from ekf_fusion_ros.ekf2.resets import Resets
 from ekf_fusion_ros.ekf2.state import FILTER_PERIOD_US
+from ekf_fusion_ros.ekf2.state import PE
+from ekf_fusion_ros.ekf2.state import PN
 from ekf_fusion_ros.ekf2.state import SECOND
 from ekf_fusion_ros.ekf2.yaw_recovery import YawRecovery
 from ekf_fusion_ros.estimator import GeoPoint
@@ -46,6 +49,7 @@ class Gnss:
         self.intermittent = True
         self.vision_yaw_forbidden = False
         self._previous_fix_us = 0
+        self._has_aided = False
 
     @property
     def wanted(self) -> bool:
@@ -186,11 +190,25 @@ class Gnss:
         f = self._f
         assert f.fix is not None
         f.events.add(f.t_now, EventKind.GPS_STARTED)
-        self._resets.position_to_fix()
+        if not self._continues():
+            self._resets.position_to_fix()
         if not f.flags.opt_flow and f.fix.has_velocity:
             self._resets.velocity_to_fix()
         f.flags.gps = True
         f.times.hor_pos = f.times.hor_vel = f.t_now
+
+    def _continues(self) -> bool:
+        """True where the position kept by dead reckoning since the last fix passes the gate."""
+        f = self._f
+        assert f.fix is not None
+        if f.params.gnss.reset_at_start or not self._has_aided:
+            self._has_aided = True
+            return False
+        gate, noise = f.params.gnss.pos_gate, self._position_sigma(f.fix.hacc) ** 2
+        ratios = [
+            test_ratio(float(f.x[state] - position), f.cov.p[state, state] + noise, gate)
+            for state, position in zip((PN, PE), f.fix.position, strict=True)]
+        return max(ratios) <= 1.0
 
     def stop(self, reason: EventKind | None) -> None:
         """Stop fusing position, velocity and height."""
