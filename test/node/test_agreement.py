@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from fuser_process import Fuser
     from fuser_process import Peer
 
+pytestmark = pytest.mark.slow
 StartFuser = Callable[..., 'Fuser']
 Array = NDArray[np.float64]
 

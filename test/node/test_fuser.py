@@ -4,23 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import math
+from pathlib import Path
 import signal
+import subprocess
+import sys
 import time
 from typing import TYPE_CHECKING
 
 import pytest
 
-pytest.importorskip('rclpy')
+rclpy = pytest.importorskip('rclpy')
 
 from nav_msgs.msg import Odometry
 from rcl_interfaces.srv import DescribeParameters
 from rclpy.qos import ReliabilityPolicy
 from sensor_msgs.msg import NavSatFix
 
+from ekf_fusion_ros.node.fusion_node import FusionNode
+from ekf_fusion_ros.session import FusionSession
+
 if TYPE_CHECKING:
     from fuser_process import Fuser
     from fuser_process import Peer
 
+pytestmark = pytest.mark.slow
 StartFuser = Callable[..., 'Fuser']
 TWO_TOPICS = {'odom': Odometry, 'fix': NavSatFix}
 
@@ -170,3 +177,65 @@ def test_overflow_of_the_queue_is_counted(start_fuser: StartFuser, peer: Peer) -
         peer.until(lambda seen=before: peer.reports['odometry'] is not seen, fuser)
     peer.until(lambda: peer.count('odometry') == sent, fuser)
     assert peer.count('odometry', 'pending') == 0
+
+
+LISTENER = """
+import rclpy
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+rclpy.init()
+node = Node('listener')
+node.create_subscription(Odometry, 'odometry/filtered', lambda m: print('heard', flush=True), 10)
+rclpy.spin(node)
+"""
+
+
+def test_a_killed_listener_does_not_stop_the_node(
+    tmp_path: Path, start_fuser: StartFuser, peer: Peer,
+) -> None:
+    fuser = start_fuser({'node.use_fix': False})
+    peer.connect(fuser, {'odom': Odometry})
+    heard = tmp_path / 'heard'
+    with heard.open('wb') as stream:
+        listener = subprocess.Popen([sys.executable, '-c', LISTENER], stdout=stream)
+    sent = 0
+
+    def drive_until(condition: Callable[[], bool]) -> None:
+        nonlocal sent
+        while not condition():
+            peer.publish('odom', odometry(0.05 * sent))
+            sent += 1
+            peer.until(lambda floor=sent - 5: peer.count('odometry') > floor, fuser)
+
+    try:
+        drive_until(lambda: heard.stat().st_size > 0)
+    finally:
+        listener.kill()
+        listener.wait()
+    before = len(peer.odometry)
+    drive_until(lambda: len(peer.odometry) > before + 50)
+    assert peer.odometry[-1].header.frame_id == 'odom'
+    assert all(math.isfinite(message.pose.pose.position.x) for message in peer.odometry)
+
+
+def test_an_unexpected_error_is_counted_and_said_once(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str],
+) -> None:
+    rclpy.init()
+    node = FusionNode()
+    try:
+        def fail(*_: object) -> None:
+            raise ArithmeticError('the unthinkable')
+
+        monkeypatch.setattr(FusionSession, 'handle', fail)
+        for number in range(3):
+            node._queue('odometry', odometry(number))
+        while node._intake:
+            node._run_core()
+        assert node._trouble['internal_errors'] == 3
+        node._report()
+    finally:
+        node.destroy_node()
+        rclpy.shutdown()
+    said = capfd.readouterr().err
+    assert said.count('the node goes on: ArithmeticError: the unthinkable') == 1
