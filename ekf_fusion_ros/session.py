@@ -33,6 +33,7 @@ from ekf_fusion_ros.roles import FIX_VELOCITY
 from ekf_fusion_ros.roles import IMU
 from ekf_fusion_ros.roles import ODOMETRY
 from ekf_fusion_ros.roles import configure
+from ekf_fusion_ros.sample_check import check_sample
 from ekf_fusion_ros.samples import GnssSample
 from ekf_fusion_ros.samples import ImuSample
 from ekf_fusion_ros.samples import LandedSample
@@ -41,6 +42,7 @@ from ekf_fusion_ros.samples import VisionSample
 from ekf_fusion_ros.stamp_order import AidingOrder
 from ekf_fusion_ros.stamp_order import InertialOrder
 from ekf_fusion_ros.stamp_order import Step
+from ekf_fusion_ros.stamp_order import check_advance
 from ekf_fusion_ros.statistics import RoleStatistics
 from ekf_fusion_ros.statistics import note_milestones
 
@@ -116,8 +118,6 @@ class FusionSession:
                           round(SECOND_US * session.pairing_tolerance),
                           round(SECOND_US * session.pairing_wait))
 
-    # -- input -------------------------------------------------------------------------------
-
     def handle(self, role: str, message: Any) -> list[FusedOutput]:
         """Take one ROS message (of rosbags or rclpy) and return the outputs that are due.
 
@@ -143,18 +143,19 @@ class FusionSession:
         role = ROLE_OF_SAMPLE[type(sample)]
         statistics = self._statistics.setdefault(role, RoleStatistics())
         statistics.received += 1
-        if self.roles is None:
-            statistics.accepted += 1
-            return self._push_directly(sample)
-        if role not in self.roles:
-            self._count_refusal(role, 'role_not_in_use', 'the session was made without it')
-            return []
         try:
-            self._judge_order(role, sample.time_us)
+            check_sample(sample)
+            if self.roles is not None:
+                self._judge_role(role, sample.time_us)
+            elif isinstance(sample, ImuSample):
+                check_advance(sample.time_us, self._now_us)
         except Refused as refusal:
             self._count_refusal(role, refusal.reason, refusal.detail)
             return []
-        return self._accept(role, sample)
+        if self.roles is not None:
+            return self._accept(role, sample)
+        statistics.accepted += 1
+        return self._push_directly(sample)
 
     def refuse(self, role: str, reason: str, detail: str = '') -> None:
         """Count a message that the caller keeps from the session, by reason."""
@@ -174,9 +175,15 @@ class FusionSession:
         if isinstance(sample, VisionSample):
             self._heading.push(sample)
         if isinstance(sample, GnssSample):
+            sample = self._with_height(sample)
             self._fixes.append(sample)
         self._estimator.push(sample)
         return []
+
+    def _judge_role(self, role: str, time_us: int) -> None:
+        if self.roles is None or role not in self.roles:
+            raise Refused('role_not_in_use', f'the session was made without role {role}')
+        self._judge_order(role, time_us)
 
     def _judge_order(self, role: str, time_us: int) -> None:
         if role != self._inertial_role:
@@ -246,8 +253,6 @@ class FusionSession:
         if heading is not None:
             self._estimator.push(heading)
 
-    # -- time --------------------------------------------------------------------------------
-
     def _run(self, role: str, reading: Any) -> list[FusedOutput]:
         """Step through the increments that end with a message of the inertial role."""
         assert self._inertial is not None
@@ -307,8 +312,6 @@ class FusionSession:
         self._resets_before.update(self._estimator.reset_counts())
         self._estimator.reset()
         self._forget()
-
-    # -- what it knows -----------------------------------------------------------------------
 
     @property
     def estimator(self) -> Estimator:

@@ -15,6 +15,15 @@ class Step(Enum):
     RESTART = 2
 
 
+def check_advance(time_us: int, last_us: int | None) -> None:
+    """Raise Refused unless a stamp lies behind the last one."""
+    if last_us is None or time_us > last_us:
+        return
+    if time_us == last_us:
+        raise Refused('repeated_stamp', f'stamp {time_us / 1e6:.6f} s came twice')
+    raise Refused('backward_stamp', f'stamp {(last_us - time_us) / 1e6:.6f} s before the last')
+
+
 class InertialOrder:
     """Judges the stamps that drive time.
 
@@ -33,13 +42,10 @@ class InertialOrder:
             self.last = time_us
             return Step.FIRST
         step = time_us - self.last
-        if step == 0:
-            raise Refused('repeated_stamp', f'stamp {time_us / 1e6:.6f} s came twice')
-        if 0 < step <= self._jump_us:
+        if abs(step) <= self._jump_us:
+            check_advance(time_us, self.last)
             self.last, self._suspect = time_us, None
             return Step.FORWARD
-        if -self._jump_us <= step < 0:
-            raise Refused('backward_stamp', f'stamp {-step / 1e6:.6f} s before the one before')
         if self._suspect is not None and 0 < time_us - self._suspect <= self._jump_us:
             self.last, self._suspect = time_us, None
             return Step.RESTART

@@ -23,7 +23,7 @@ LAYERS = (
     ('messages',),
     (
         'session', 'fused_output', 'holding', 'inputs', 'odometry_heading', 'pairing', 'roles',
-        'stamp_order', 'statistics', 'warm_up',
+        'sample_check', 'stamp_order', 'statistics', 'warm_up',
     ),
     ('analysis',),
     ('node', 'replay'),

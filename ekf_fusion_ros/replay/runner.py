@@ -11,6 +11,7 @@ from dataclasses import field
 from dataclasses import replace
 import time
 from typing import Any
+import zlib
 
 from tqdm import tqdm
 
@@ -32,8 +33,6 @@ from ekf_fusion_ros.replay.topics import ALL_TYPES
 from ekf_fusion_ros.replay.topics import Choice
 from ekf_fusion_ros.replay.topics import choose
 from ekf_fusion_ros.replay.withholding import Withholding
-from ekf_fusion_ros.samples import ImuSample
-from ekf_fusion_ros.samples import LandedSample
 from ekf_fusion_ros.samples import Sample
 from ekf_fusion_ros.session import FusionSession
 
@@ -92,6 +91,8 @@ def _replay_csv(options: ReplayOptions, say: Say) -> dict[str, Any]:
     progress = Progress()
     run = _Run(options, None, progress)
     run.drive(_csv_steps(run))
+    for note in progress.notes:
+        say(note)
     return run.finish(Choice(), say)
 
 
@@ -189,7 +190,7 @@ def _bag_steps(
 def _csv_steps(run: _Run) -> Iterator[list[FusedOutput]]:
     """Hand the samples of a sensor CSV to the session, yielding what is due after each."""
     session, options, progress = run.session, run.options, run.progress
-    for sample in _with_bar(_samples(options), None, options.progress):
+    for sample in _with_bar(_samples(options, progress), None, options.progress):
         if not progress.start_us:
             progress.start_us = sample.time_us
             run.withholding = Withholding(options.withhold, sample.time_us)
@@ -206,19 +207,20 @@ def _csv_steps(run: _Run) -> Iterator[list[FusedOutput]]:
         yield session.push(sample)
 
 
-def _samples(options: ReplayOptions) -> Iterator[Sample]:
+def _samples(options: ReplayOptions, progress: Progress) -> Iterator[Sample]:
+    """Yield the samples of a sensor CSV, as far as it can be read."""
     from ekf_fusion_ros.replay.sensor_csv import read_sensor_csv
-    flags = {name: bool(options.vehicle[name]) for name in ('fixed_wing', 'fuse_beta')
-             if name in options.vehicle}
+    vehicle = {name: str(value) for name, value in options.vehicle.items()}
     seen = False
     try:
-        for sample in read_sensor_csv(options.recording):
-            seen = seen or isinstance(sample, ImuSample)
-            yield replace(sample, **flags) if isinstance(sample, LandedSample) else sample
-    except (ValueError, EOFError, OSError) as error:
-        raise RecordingError(f'{options.recording}: {error}') from error
-    if not seen:
-        raise RecordingError(f'{options.recording}: holds no imu rows')
+        for sample in read_sensor_csv(options.recording, vehicle=vehicle):
+            seen = True
+            yield sample
+    except (ValueError, EOFError, OSError, zlib.error) as error:
+        if not seen:
+            raise RecordingError(f'{options.recording}: {error}') from error
+        progress.notes.append(f'{options.recording.name} is damaged and replayed as far as it '
+                              f'can be read ({error})')
 
 
 def _with_bar(items: Iterable[Any], total: int | None, shown: bool) -> Iterator[Any]:

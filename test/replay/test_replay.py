@@ -365,3 +365,27 @@ def test_odometry_alone_is_local(shared, tmp_path):
     assert rows(tmp_path)[-1, 1:3] == pytest.approx([last.x, last.y], abs=0.3)
     with Reader(tmp_path / 'fused') as reader:
         assert {one.topic for one in reader.connections} == {'/odometry/filtered'}
+
+
+def test_damaged_sensor_csv(tmp_path):
+    """What cannot be in a filter is counted; a broken end is told; the rest is used."""
+    lines = []
+    for step in range(1, 1251):
+        time_us = 1_000_000 + 8000 * step
+        if step % 5 == 0:
+            lines += [f'{time_us},mag,0.21,0.0,0.42', f'{time_us},baro,100.0']
+        if step % 100 == 50:
+            lines += [f'{time_us},imu,nan,0.0,-9.8,0.0,0.0,0.0', f'{time_us},baro,inf',
+                      f'{time_us - 50_000},imu,0.0,0.0,-9.8,0.0,0.0,0.0']
+        lines.append(f'{time_us},imu,0.0,0.0,-9.80665,0.0,0.0,0.0')
+    path = tmp_path / 'rest.csv'
+    path.write_text('\n'.join([*lines, 'broken row']))
+    assert run(path, tmp_path / 'out', '--set', 'ekf2.gnss.enabled=false') == 0
+    about, table = summary(tmp_path / 'out'), rows(tmp_path / 'out')
+    refused = about['topics']['imu']['refused']
+    assert refused['not_finite'] > 0
+    assert refused['bad_interval'] + refused.get('backward_stamp', 0) > 0
+    assert about['topics']['pressure']['refused']['not_finite'] == 13
+    assert any('damaged' in note for note in about['notes'])
+    assert np.isfinite(table).all()
+    assert np.abs(table[:, 4:6]).max() < 0.01
