@@ -9,6 +9,9 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from dataclasses import field
 from dataclasses import replace
+from functools import cache
+import sys
+from threading import Timer
 import time
 from typing import Any
 import zlib
@@ -35,9 +38,12 @@ from ekf_fusion_ros.replay.topics import choose
 from ekf_fusion_ros.replay.withholding import Withholding
 from ekf_fusion_ros.samples import Sample
 from ekf_fusion_ros.session import FusionSession
+from ekf_fusion_ros.warm_up import warm_up
 
 CSV_SUFFIXES = ('.csv', '.csv.gz')
 BAR_STEP = 200
+COMPILE_NOTICE_AFTER = 3.0
+COMPILE_NOTICE = 'compiling the numeric kernels: a minute or so, once; the result is cached'
 Say = Callable[[str], None]
 
 
@@ -64,9 +70,22 @@ def replay(options: ReplayOptions, say: Say = print) -> dict[str, Any]:
     """
     if not options.recording.exists():
         raise RecordingError(f'{options.recording}: does not exist')
+    make_kernels_ready()
     if options.recording.name.endswith(CSV_SUFFIXES):
         return _replay_csv(options, say)
     return _replay_bag(options, say)
+
+
+@cache
+def make_kernels_ready() -> None:
+    """Load or compile the kernels, once a process; say so where it takes long."""
+    notice = Timer(COMPILE_NOTICE_AFTER, print, [COMPILE_NOTICE], {'file': sys.stderr})
+    notice.daemon = True
+    notice.start()
+    try:
+        warm_up(Params())
+    finally:
+        notice.cancel()
 
 
 def _replay_bag(options: ReplayOptions, say: Say) -> dict[str, Any]:
