@@ -124,7 +124,7 @@ def _solution_status(ekf: Ekf2) -> int:
     f = ekf.filter
     flags, seen = f.flags, f.observations
     clean = not f.faults.any()
-    horizontal = flags.aided_horizontally()
+    horizontal = flags.aided_horizontally() and clean
     relative = flags.gps or flags.ev_pos or flags.opt_flow
     absolute = flags.gps or flags.ev_pos
     height = flags.has_height()
@@ -132,7 +132,7 @@ def _solution_status(ekf: Ekf2) -> int:
                    _horizontal_position(ekf).test_ratio) > 1.0
     mag_good = seen.mag.test_ratio < 1.0 and seen.yaw.test_ratio < 1.0
     return word([
-        flags.tilt_align and flags.yaw_align and clean, horizontal and clean, height and clean,
+        flags.tilt_align and flags.yaw_align and clean, horizontal, height and clean,
         relative and clean, absolute and clean, height and clean,
         ekf.control.terrain.valid, not horizontal, relative and clean, absolute and clean,
         gnss_bad and mag_good, f.faults.accel_vertical])
