@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.analysis.comparison import Comparison
+from ekf_fusion_ros.analysis.comparison import Window
+from ekf_fusion_ros.analysis.errors import Alignment
 from ekf_fusion_ros.analysis.errors import Track
 from ekf_fusion_ros.analysis.errors import horizontal
 from ekf_fusion_ros.analysis.errors import inside
@@ -57,20 +60,25 @@ def _map(axes: Any, flight: Comparison) -> None:
 def _close_up(axes: Any, flight: Comparison) -> None:
     begin, end = flight.outage
     shown = (begin - 15.0, end + 15.0)
+    ends = flight.truth.at(np.array(shown))
+    chord = ends[1] - ends[0]
+    # From left to right, whatever the direction of flight.
+    turned = Alignment(-math.atan2(chord[1], chord[0]), np.zeros(3))
 
-    def cut(track: Track) -> Track:
-        return track.where(inside(track.time, (shown,)))
+    def cut(track: Track, window: Window = shown) -> Track:
+        part = track.where(inside(track.time, (window,)))
+        return Track(part.time, turned.apply(part.position - ends[0]))
 
-    lost = flight.truth.where(inside(flight.truth.time, (flight.outage,)))
-    _line(axes, lost, '', OUTAGE, linewidth=14.0, solid_capstyle='butt', zorder=1)
+    _line(axes, cut(flight.truth, flight.outage), '', OUTAGE, linewidth=14.0,
+          solid_capstyle='butt', zorder=1)
     _line(axes, cut(flight.fixes), '', GPS, linestyle='', marker='.', markersize=4.0)
     _line(axes, cut(flight.aligned_odometry()), '', ODOMETRY, linewidth=1.4)
     _line(axes, cut(flight.truth), '', TRUTH, linewidth=2.4)
     _line(axes, cut(flight.fused), '', FUSED, linewidth=1.3)
     axes.set_aspect('equal', adjustable='datalim')
-    axes.set_title(f'the outage, {begin:.0f} to {end:.0f} s')
-    axes.set_xlabel('east (m)')
-    axes.set_ylabel('north (m)')
+    axes.set_title(f'the outage, {begin:.0f} to {end:.0f} s, flown from left to right')
+    axes.set_xlabel('along (m)')
+    axes.set_ylabel('across (m)')
     axes.grid(alpha=0.3)
 
 
@@ -96,9 +104,9 @@ def _bounds(axes: Any, flight: Comparison, axis: int, name: str) -> None:
                       label='3 sigma of the filter')
     axes.plot(fused.time, fused.position[:, axis], color=FUSED, linewidth=1.0, label='fused')
     # The outage would dwarf the rest: its bounds leave the picture.
-    usual = np.abs(np.append(3.0 * sigma[~inside(fused.time, (flight.outage,))],
-                             fused.position[:, axis]))
-    axes.set_ylim(-1.3 * usual.max(), 1.3 * usual.max())
+    errors = np.abs(fused.position[:, axis])
+    limit = 1.3 * max(3.0 * np.quantile(sigma, 0.9), errors.max())
+    axes.set_ylim(-limit, limit)
     axes.set_title(f'fused error {name}')
     axes.set_ylabel('m')
     _finish(axes, flight)
