@@ -36,7 +36,6 @@ from ekf_fusion_ros.roles import configure
 from ekf_fusion_ros.sample_check import check_sample
 from ekf_fusion_ros.samples import GnssSample
 from ekf_fusion_ros.samples import ImuSample
-from ekf_fusion_ros.samples import LandedSample
 from ekf_fusion_ros.samples import Sample
 from ekf_fusion_ros.samples import VisionSample
 from ekf_fusion_ros.stamp_order import AidingOrder
@@ -261,14 +260,11 @@ class FusionSession:
         if role == ODOMETRY:
             self._push_odometry(reading)
         for imu in increments:
-            first = self._now_us is None
             for due in self._holding.release(imu.time_us):
                 self._aid(*due)
             if self._pairing is not None:
                 self._push_fixes(self._pairing.advance(imu.time_us))
             outputs += self._advance(imu)
-            if first and self.params.session.assume_in_air:
-                self._estimator.push(LandedSample(imu.time_us, landed=False))
         return outputs
 
     def _advance(self, imu: ImuSample) -> list[FusedOutput]:

@@ -17,9 +17,6 @@ class SessionParams:
     automatic_aiding: bool = param(
         True, 'Let the roles in use choose height reference, magnetometer and odometry aiding. A '
         'value of ekf2 that differs from its default wins.')
-    assume_in_air: bool = param(
-        True, 'Take the vehicle for moving where nothing tells when it has landed; needed to '
-        'find yaw from motion.')
     horizon_ms: float = param(
         200.0, 'Shortest delay of the fusion horizon: the time by which messages may be late '
         'after their stamp.', unit='ms', min=0, max=2000)
