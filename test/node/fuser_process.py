@@ -75,6 +75,7 @@ class Peer:
         self.gps: list[Odometry] = []
         self.fixes: list[NavSatFix] = []
         self.reports: dict[str, Any] = {}
+        self.report_count = 0
         for kind, topic, keep in (
             (Odometry, 'odometry/filtered', self.odometry.append),
             (Odometry, 'odometry/gps', self.gps.append),
@@ -84,6 +85,7 @@ class Peer:
             self.node.create_subscription(kind, topic, keep, RELIABLE)
 
     def _note(self, message: DiagnosticArray) -> None:
+        self.report_count += 1
         for status in message.status:
             self.reports[status.name.split(': ')[1]] = status
 
@@ -95,6 +97,10 @@ class Peer:
             lambda: bool(self.reports) and all(
                 publisher.get_subscription_count() for publisher in self._publishers.values()),
             fuser)
+        # The node may learn of the publishers a little later; until then it drops best-effort
+        # messages.
+        seen = self.report_count
+        self.until(lambda: self.report_count >= seen + 5, fuser)
 
     def publish(self, topic: str, message: Any) -> None:
         """Publish one message."""
