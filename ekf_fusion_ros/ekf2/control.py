@@ -18,10 +18,12 @@ from ekf_fusion_ros.ekf2.gnss_checks import GnssChecks
 from ekf_fusion_ros.ekf2.heading import HeadingFusion
 from ekf_fusion_ros.ekf2.height import Height
 from ekf_fusion_ros.ekf2.resets import Resets
+from ekf_fusion_ros.ekf2.state import PD
 from ekf_fusion_ros.ekf2.terrain import Terrain
 from ekf_fusion_ros.ekf2.validity import Validity
 from ekf_fusion_ros.ekf2.yaw_estimator import YawEstimator
 from ekf_fusion_ros.ekf2.yaw_recovery import YawRecovery
+from ekf_fusion_ros.estimator import GeoPoint
 
 TILT_ALIGNED_VARIANCE = math.radians(3.0) ** 2
 
@@ -76,6 +78,19 @@ class Control:
         self.terrain.step()
         self._step_bank(gnss_popped)
         self._note_activity()
+
+    def move_origin(self, origin: GeoPoint) -> bool:
+        """Move the origin of the local frame; False where the point is unusable.
+
+        Barometer and ground move with the frame, so that they do not pull the height back.
+        """
+        before = float(self._f.x[PD])
+        if not self.gnss.move_origin(origin):
+            return False
+        shift = float(self._f.x[PD]) - before
+        self.baro.offset += shift
+        self.terrain.move(shift)
+        return True
 
     def _check_tilt(self) -> None:
         f = self._f

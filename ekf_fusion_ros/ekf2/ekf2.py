@@ -182,7 +182,7 @@ class Ekf2:
 
     def set_origin(self, origin: GeoPoint) -> bool:
         """Move the origin of the local frame, keeping the place of the vehicle on the earth."""
-        return self.control.gnss.move_origin(origin)
+        return self.control.move_origin(origin)
 
 
 def max_delay_ms(params: Ekf2Params) -> float:

@@ -31,6 +31,11 @@ class Terrain:
         f.times.hagl = f.t_now
         f.times.flow_terrain = f.t_now
 
+    def move(self, shift: float) -> None:
+        """Shift down in m: the frame has moved, not the ground."""
+        self.down += shift
+        self._last_on_ground_down += shift
+
     def step(self) -> None:
         """Run once per filter period, after all fusion."""
         f = self._f

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -88,6 +90,8 @@ class Gnss:
     def _set_origin(self, sample: GnssSample) -> None:
         """Tie the local frame to the earth so that a position already in use stays valid."""
         f = self._f
+        # fixes that came before had no place in the local frame
+        self.buffer.clear()
         altitude = sample.alt
         if f.flags.aided_horizontally():
             f.earth.set_origin_from(sample.lat, sample.lon, altitude, f.position)
@@ -103,9 +107,10 @@ class Gnss:
                      f'{f.earth.origin_lat:.7f}, {f.earth.origin_lon:.7f}')
 
     def move_origin(self, origin: GeoPoint) -> bool:
-        """Move the origin; position, waiting fixes and offsets keep their place on the earth."""
+        """Move the origin; position and waiting fixes keep their place on the earth."""
         f = self._f
-        if not abs(origin.lat) <= 90.0 or not abs(origin.lon) <= 180.0:
+        on_earth = abs(origin.lat) <= 90.0 and abs(origin.lon) <= 180.0
+        if not on_earth or not math.isfinite(origin.alt):
             return False
         before = f.earth.projection
         altitude_before = f.earth.alt_ref
@@ -113,10 +118,13 @@ class Gnss:
         f.earth.set_origin(origin.lat, origin.lon, origin.alt)
         f.earth.look_around(origin.lat, origin.lon, f.t_now)
         if before is None or place is None or f.earth.projection is None:
+            self.buffer.clear()
             return True
         position = np.array(f.earth.projection.project(*place))
         shift = position - f.x[7:9]
         self.buffer.replace(lambda fix: fix._replace(position=fix.position + shift))
+        if f.fix is not None:
+            f.fix = f.fix._replace(position=f.fix.position + shift)
         self._resets.move_horizontally(shift)
         self._resets.move_vertically(origin.alt - altitude_before)
         return True
