@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from ekf_fusion_ros.geo.projection import Wgs84Projection
 from ekf_fusion_ros.mathlib.angles import wrap_pi
+from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
 from ekf_fusion_ros.params.two_topic import MotionHeadingParams
 from ekf_fusion_ros.params.two_topic import TwoTopicParams
 from ekf_fusion_ros.samples import GnssSample
 from ekf_fusion_ros.samples import HeadingSample
+from ekf_fusion_ros.samples import VelocityFrame
 from ekf_fusion_ros.samples import VisionSample
 
 Complex = NDArray[np.complex128]
@@ -87,14 +89,17 @@ class MotionHeading:
         self._contradictions = 0
 
     def push_odometry(self, sample: VisionSample) -> None:
-        """Take an odometry message; one without a position ends the track."""
-        if not sample.has_position:
-            self._forget_track()
-            return
+        """Take an odometry message.
+
+        One without a position is summed up from its velocity; without either the track ends.
+        """
         if self._reset_counter is not None and sample.reset_counter != self._reset_counter:
             self._forget_track()
         self._reset_counter = sample.reset_counter
-        place = complex(sample.position[0], sample.position[1])
+        place = self._place(sample)
+        if place is None:
+            self._forget_track()
+            return
         path = 0.0
         if self._track:
             before_us, before, path = self._track[-1]
@@ -104,6 +109,22 @@ class MotionHeading:
         self._track.append((sample.time_us, place, path))
         while len(self._track) > 2 and self._track[1][0] < sample.time_us - HISTORY_US:
             self._track.popleft()
+
+    def _place(self, sample: VisionSample) -> complex | None:
+        if sample.has_position:
+            return complex(sample.position[0], sample.position[1])
+        if not sample.has_velocity:
+            return None
+        velocity = sample.velocity
+        if sample.velocity_frame is VelocityFrame.BODY_FRD:
+            if math.isnan(sample.quaternion[0]):
+                return None
+            velocity = matrix_from_quat(sample.quaternion) @ velocity
+        if not self._track:
+            return 0j
+        before_us, before, _ = self._track[-1]
+        dt = (sample.time_us - before_us) / SECOND
+        return before + dt * complex(velocity[0], velocity[1])
 
     def forget(self) -> None:
         """Begin a new window: the odometry frame has jumped."""
@@ -132,7 +153,7 @@ class MotionHeading:
         if self._fit is None:
             text = f'aligning yaw from motion: drive {path:.0f} m so far, nothing to match yet'
             return HeadingStatus(math.nan, path, text)
-        sigma = self._fit.sigma
+        sigma = min(self._fit.sigma, math.pi)
         words = f'sigma {math.degrees(sigma):.0f} deg, drive {path:.0f} m'
         if math.isfinite(self._announced):
             return HeadingStatus(sigma, path, f'yaw from motion: {words}')
@@ -185,7 +206,8 @@ class MotionHeading:
         while len(points) > MIN_POINTS:
             age = (newest.time_us - points[1].time_us) / SECOND
             path = newest.path - points[1].path
-            long_enough = age >= params.window_time and path >= params.window_path
+            known = self._fit is not None and self._fit.sigma < params.announce_sigma
+            long_enough = known and age >= params.window_time and path >= params.window_path
             if not long_enough and age < params.window_time_max:
                 return
             points.popleft()

@@ -142,7 +142,8 @@ class OdometryImu:
 
     def _limited(self, velocity: Array, before: Array, dt: float) -> Array:
         change = velocity - before
-        size, limit = float(np.linalg.norm(change)), self._params.max_acceleration * dt
+        size = float(np.linalg.norm(change))
+        limit = self._params.max_acceleration * dt + self._params.jump_speed
         if size <= limit:
             return velocity
         self.jumps['velocity'] += 1

@@ -22,6 +22,9 @@ Array = NDArray[np.float64]
 BAD_ACCEL_NOISE = 4.9
 """Accelerometer noise in m/s^2 while it clips or contradicts the height aiding."""
 
+DRIFT_SPEED = 1.0
+"""Speed in m/s above which the position drift of dead reckoning grows no more."""
+
 
 class Covariance:
     """Covariance of the 24 states; nothing outside this class and its kernels writes `p`."""
@@ -73,7 +76,7 @@ class Covariance:
         predict_covariance(self.p, self._transition, x, imu, self._angle_var, velocity_var, noise,
                            self.inhibited, self._saved, self.mag_active, self.wind_active)
         if self._position_drift_var > 0.0:
-            variance = self._position_drift_var * math.hypot(x[4], x[5])
+            variance = self._position_drift_var * min(math.hypot(x[4], x[5]), DRIFT_SPEED)
             self.p[7, 7] += variance
             self.p[8, 8] += variance
         if self._yaw_drift_var > 0.0:

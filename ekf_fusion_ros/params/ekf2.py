@@ -252,8 +252,9 @@ class AidingParams:
     reset_timeout: float = param(7.0, 'Time without accepted aiding before a reset.', unit='s',
                                  min=1, max=60)
     position_drift: float = param(
-        0.0, 'Random walk of the horizontal position by distance travelled, for inertial input '
-        'whose velocity is wrong for long (scale, slip).', unit='m/sqrt(m)', min=0, max=10)
+        0.0, 'Random walk of the horizontal position by distance travelled (by time above 1 m/s), '
+        'for inertial input whose velocity is wrong for long (scale, slip).', unit='m/sqrt(m)',
+        min=0, max=10)
     yaw_drift: float = param(
         0.0, 'Random walk of yaw beside the gyro noise.', unit='rad/sqrt(s)', min=0, max=1)
     hold_yaw: bool = param(

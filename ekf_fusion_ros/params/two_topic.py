@@ -29,6 +29,9 @@ class OdometryImuParams:
     jump_distance: float = param(
         0.5, 'Smallest step of the position, beyond what the speed explains, that is a jump.',
         unit='m', min=0.01, max=100)
+    jump_speed: float = param(
+        0.5, 'Change of velocity between messages that noise explains at any rate.', unit='m/s',
+        min=0, max=100)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +41,8 @@ class MotionHeadingParams:
     interval: float = param(
         1.0, 'Fixes inside this time are averaged to one point.', unit='s', min=0.05, max=10)
     window_time: float = param(
-        18.0, 'Time span of the fit; longer while the path in it is short.', unit='s', min=2,
+        18.0, 'Time span of the fit; longer while its path is short or its sigma is '
+        'large.', unit='s', min=2,
         max=600)
     window_path: float = param(
         18.0, 'Path that the fit spans at least, if the longest time allows.', unit='m', min=1,
