@@ -60,6 +60,14 @@ ROLE_OF_SAMPLE: dict[type, str] = {
     HeadingSample: 'heading',
 }
 
+JUMPS = {
+    'position': 'the position of the odometry jumped: the frame is taken to have moved',
+    'attitude': 'the attitude of the odometry jumped: the frame is taken to have turned',
+    'declared': 'the odometry says that its frame has jumped',
+    'velocity': 'the velocity of the odometry changed faster than two_topic.odometry.'
+                'max_acceleration: it is limited',
+}
+
 
 def decoder_of(role: str, params: Params) -> Callable[[Any], Any]:
     """Return the function that turns a message of `role` into a stamped sample."""
@@ -88,6 +96,18 @@ class InertialInput:
             return reading
         sample: VisionSample | None = self._odometry.fused()
         return reading if sample is None else sample
+
+    def jump(self) -> str:
+        """Return in words how the odometry frame jumped with the last message, '' if it did not.
+
+        Velocities that change too fast are counted all the time but told once.
+        """
+        if self._odometry is None:
+            return ''
+        kind = self._odometry.jump
+        if kind in JUMPS and (kind != 'velocity' or self._odometry.jumps[kind] == 1):
+            return JUMPS[kind]
+        return ''
 
 
 def make_estimator(params: Params) -> Estimator:

@@ -88,11 +88,14 @@ class MotionHeading:
         self._held: tuple[float, float] | None = None
         self._contradictions = 0
 
-    def push_odometry(self, sample: VisionSample) -> None:
+    def push_odometry(self, sample: VisionSample, *, jumped: bool = False) -> None:
         """Take an odometry message.
 
+        `jumped`: the odometry frame is not the one of the message before; a new window begins.
         One without a position is summed up from its velocity; without either the track ends.
         """
+        if jumped:
+            self._forget_track()
         if self._reset_counter is not None and sample.reset_counter != self._reset_counter:
             self._forget_track()
         self._reset_counter = sample.reset_counter
@@ -125,10 +128,6 @@ class MotionHeading:
         before_us, before, _ = self._track[-1]
         dt = (sample.time_us - before_us) / SECOND
         return before + dt * complex(velocity[0], velocity[1])
-
-    def forget(self) -> None:
-        """Begin a new window: the odometry frame has jumped."""
-        self._forget_track()
 
     def hold(self, yaw: float, sigma: float) -> None:
         """Note the heading of the odometry frame that the filter holds, rad as in HeadingFit."""

@@ -47,13 +47,15 @@ class OdometryImu:
     acceleration, so the strapdown of the increments meets attitude and velocity of each message.
     Only differences within one message interval are used: a jump of the odometry's frame leaves
     the increments continuous, and is counted in `jumps` by kind (position, attitude, velocity,
-    declared). Messages whose stamp does not advance are counted as stamp.
+    declared); `jump` names the kind of the newest message. A stamp that does not advance is
+    counted as stamp.
     """
 
     def __init__(self, params: TwoTopicParams) -> None:
         """Start without a message."""
         self._params: OdometryImuParams = params.odometry
         self.jumps: Counter[str] = Counter()
+        self.jump = ''
         self._last: _Reading | None = None
         self._attitude = LEVEL
         self._turn = np.zeros(3)
@@ -63,6 +65,7 @@ class OdometryImu:
     def push(self, sample: VisionSample) -> list[ImuSample]:
         """Return the increments (0 to many) that end with this message, the last at its stamp."""
         last = self._last
+        self.jump = ''
         attitude = sample.quaternion if math.isfinite(sample.quaternion[0]) else LEVEL
         if last is None:
             position = sample.position.copy()
@@ -74,11 +77,11 @@ class OdometryImu:
             return []
         dt = (sample.time_us - last.time_us) / SECOND
         if dt <= 0.0:
-            self.jumps['stamp'] += 1
+            self._count('stamp')
             return []
         declared = sample.reset_counter != last.reset_counter
         if declared:
-            self.jumps['declared'] += 1
+            self._count('declared')
         turn = self._turn_between(last.attitude, attitude, dt, declared)
         velocity = self._velocity(sample, attitude, last, dt, declared)
         increments = self._increments(last, velocity, turn, sample.time_us)
@@ -98,6 +101,10 @@ class OdometryImu:
         """
         return self._sample
 
+    def _count(self, kind: str) -> None:
+        self.jumps[kind] += 1
+        self.jump = kind
+
     def _turn_between(self, before: Array, after: Array, dt: float, declared: bool) -> Array:
         """Return the rotation vector of the body over the interval; the last rate at a jump."""
         turn = rotation_vector_from_quat(quat_multiply(quat_inverse(before), after))
@@ -107,7 +114,7 @@ class OdometryImu:
             angle = 2.0 * math.pi - angle
         jumped = angle > max(self._params.max_rate * dt, 0.1)
         if jumped:
-            self.jumps['attitude'] += 1
+            self._count('attitude')
         return self._turn * dt if jumped or declared else turn
 
     def _velocity(
@@ -137,7 +144,7 @@ class OdometryImu:
         excess = float(np.linalg.norm(step)) - explained
         jumped = excess > max(self._params.jump_distance, slack)
         if jumped:
-            self.jumps['position'] += 1
+            self._count('position')
         return jumped
 
     def _limited(self, velocity: Array, before: Array, dt: float) -> Array:
@@ -146,7 +153,7 @@ class OdometryImu:
         limit = self._params.max_acceleration * dt + self._params.jump_speed
         if size <= limit:
             return velocity
-        self.jumps['velocity'] += 1
+        self._count('velocity')
         return before + change * (limit / size)
 
     def _increments(

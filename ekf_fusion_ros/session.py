@@ -232,8 +232,11 @@ class FusionSession:
 
     def _push_odometry(self, sample: VisionSample) -> None:
         self._heading.push(sample)
+        jump = '' if self._inertial is None else self._inertial.jump()
+        if jump:
+            self._tell(sample.time_us, jump)
         if self._motion is not None:
-            self._motion.push_odometry(sample)
+            self._motion.push_odometry(sample, jumped=bool(jump))
         self._estimator.push(sample if self._inertial is None else self._inertial.fused(sample))
 
     def _push_fixes(self, fixes: Sequence[GnssSample]) -> None:

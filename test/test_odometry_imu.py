@@ -142,3 +142,15 @@ def test_covariance_of_velocity_has_a_floor_and_keeps_what_exceeds_it(source):
     floor = TwoTopicParams().odometry.velocity_noise ** 2
     source.push(odometry(0, NAN3, LEVEL, (1, 0, 0), velocity_cov=np.diag((1e-6, 4.0, math.nan))))
     assert np.diag(source.fused().velocity_cov) == pytest.approx((floor, 4.0, floor))
+
+
+def test_a_session_tells_when_the_odometry_frame_jumps():
+    from ekf_fusion_ros.params.tree import Params
+    from ekf_fusion_ros.session import FusionSession
+    session = FusionSession(Params(), ('odometry', 'fix'))
+    for k in range(40):
+        place = (0.1 * k + (70.0 if k >= 20 else 0.0), 0, 0)
+        session.push(odometry(1_000_000 + 100_000 * k, place, LEVEL, (1, 0, 0)))
+    told = [event.text for event in session.drain_events() if 'jumped' in event.text]
+    assert len(told) == 1
+    assert 'position of the odometry' in told[0]
