@@ -108,7 +108,7 @@ class Control:
     def _step_bank(self, gnss_popped: bool) -> None:
         f = self._f
         airspeed = f.params.yaw_estimator.default_airspeed if f.flags.fixed_wing else 0.0
-        self.bank.step(f.imu.increments, f.flags.in_air, airspeed, f.x[10:13] / f.dt_avg)
+        self.bank.step(f.imu.increments, f.flags.in_air, airspeed, f.x[10:13], f.dt_avg)
         fix = f.fix
         if gnss_popped and fix is not None and fix.has_velocity and fix.vacc > 0.0:
             self.bank.set_velocity(fix.velocity, fix.vacc)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
 
 import numpy as np
@@ -9,16 +10,18 @@ from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.state import FILTER_PERIOD
 from ekf_fusion_ros.ekf2.state import SIZE
-from ekf_fusion_ros.kernels.magnetic import fuse_field_axis
+from ekf_fusion_ros.kernels.magnetic import fuse_field
 from ekf_fusion_ros.kernels.prediction import GRAVITY
 from ekf_fusion_ros.kernels.prediction import predict_covariance
 from ekf_fusion_ros.kernels.update import apply_direct
+from ekf_fusion_ros.kernels.update import apply_pair
 from ekf_fusion_ros.kernels.update import apply_update
 from ekf_fusion_ros.kernels.update import limit_covariance
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 
 Array = NDArray[np.float64]
 
+NO_CLIPPING = (False, False, False)
 BAD_ACCEL_NOISE = 4.9
 """Accelerometer noise in m/s^2 while it clips or contradicts the height aiding."""
 
@@ -33,6 +36,7 @@ class Covariance:
         """Start at zero; `initialise` gives the first values."""
         self.p: Array = np.zeros((SIZE, SIZE))
         self.inhibited = np.zeros(3)
+        self._inhibited_axes = (False, False, False)
         self._saved = np.zeros(3)
         self._transition = np.zeros((10, SIZE))
         self._saved_ne = np.zeros((2, 2))
@@ -68,7 +72,7 @@ class Covariance:
         velocity_var = self._accel_var
         if bad_accel:
             velocity_var = self._bad_accel_var
-        elif any(clipping):
+        elif clipping != NO_CLIPPING:
             velocity_var = np.where(clipping, self._bad_accel_var, self._accel_var)
         noise = self._noise
         if self.wind_active:
@@ -88,15 +92,19 @@ class Covariance:
         self._accel_var = np.clip(self._accel_var * factor, self._stated_accel_var,
                                   self._bad_accel_var)
 
-    def inhibit_accel_bias(self, axis: int, inhibit: bool) -> None:
-        """Freeze or release the estimation of one accelerometer bias, keeping its variance."""
-        state = 13 + axis
-        if inhibit and self.inhibited[axis] == 0.0:
-            self._saved[axis] = self.p[state, state]
-            self.inhibited[axis] = 1.0
-        elif not inhibit and self.inhibited[axis] != 0.0:
-            self.p[state, state] = self._saved[axis]
-            self.inhibited[axis] = 0.0
+    def inhibit_accel_bias(self, axes: tuple[bool, bool, bool]) -> None:
+        """Freeze the estimation of some accelerometer biases, keeping their variance."""
+        if axes == self._inhibited_axes:
+            return
+        self._inhibited_axes = axes
+        for axis, inhibit in enumerate(axes):
+            state = 13 + axis
+            if inhibit and self.inhibited[axis] == 0.0:
+                self._saved[axis] = self.p[state, state]
+                self.inhibited[axis] = 1.0
+            elif not inhibit and self.inhibited[axis] != 0.0:
+                self.p[state, state] = self._saved[axis]
+                self.inhibited[axis] = 0.0
 
     def fuse_direct(self, x: Array, state: int, variance: float, innovation: float) -> bool:
         """Correct with an observation of one state; False on a numerical fault."""
@@ -110,14 +118,21 @@ class Covariance:
             self.p, x, gain, hp, innovation, self.inhibited, self._accel_bias_var_max,
             self.mag_active, self.wind_active))
 
-    def fuse_field_axis(
-        self, x: Array, axis: int, innovation: float, noise: float, all_states: bool,
-        variance: Array,
+    def fuse_pair(
+        self, x: Array, first: int, variance: Sequence[float], innovation: Sequence[float],
     ) -> int:
-        """Correct with one magnetometer axis; see kernels.magnetic.fuse_field_axis."""
-        return int(fuse_field_axis(
-            x, self.p, axis, innovation, noise, all_states, self.inhibited,
-            self._accel_bias_var_max, self.wind_active, variance))
+        """Correct with observations of two neighbouring states; bit i is set for a fault of i."""
+        return int(apply_pair(
+            self.p, x, first, variance[0], variance[1], innovation[0], innovation[1],
+            self.inhibited, self._accel_bias_var_max, self.mag_active, self.wind_active))
+
+    def fuse_field(
+        self, x: Array, innovation: Array, axes: int, noise: float, all_states: bool,
+        declination: float, shortest: float, variance: Array, outcome: Array,
+    ) -> None:
+        """Correct with the first magnetometer axes; see kernels.magnetic.fuse_field."""
+        fuse_field(x, self.p, innovation, axes, noise, all_states, declination, shortest,
+                   self.inhibited, self._accel_bias_var_max, self.wind_active, variance, outcome)
 
     def decorrelate(self, first: int, size: int) -> None:
         """Remove all correlations of states first .. first + size - 1, keeping variances."""

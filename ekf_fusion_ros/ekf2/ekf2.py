@@ -38,8 +38,6 @@ from ekf_fusion_ros.samples import VisionSample
 
 Array = NDArray[np.float64]
 
-MIN_PERIOD_FOR_RATE = 2.5e-3
-
 
 class Ekf2:
     """Attitude, velocity, position, sensor biases, magnetic field and wind from many sensors.
@@ -145,13 +143,9 @@ class Ekf2:
         f = self.filter
         f.imu = self.inertial.ring[0]
         increments = f.imu.increments
-        advance_state(f.x, f.rot, increments, f.earth.rate_ned, f.accel_lpf, f.dt_avg,
-                      self.params.imu.accel_bias_limit, self._learning.peaks,
-                      self._learning.decay)
-        mean_dt = 0.5 * float(increments[6] + increments[7])
-        f.dt_avg = 0.99 * f.dt_avg + 0.01 * min(max(mean_dt, 0.005), 0.02)
-        if increments[6] > MIN_PERIOD_FOR_RATE:
-            f.rate = increments[0:3] / increments[6]
+        f.dt_avg = advance_state(
+            f.x, f.rot, increments, f.earth.rate_ned, f.accel_lpf, f.dt_avg,
+            self.params.imu.accel_bias_limit, self._learning.peaks, self._learning.decay)
         self._learning.step()
         f.cov.wind_active = f.flags.wind
         f.cov.predict(f.x, increments, f.dt_avg, f.faults.accel_vertical, f.imu.clipping, 0.0)

@@ -24,6 +24,10 @@ from ekf_fusion_ros.samples import VisionSample
 Array = NDArray[np.float64]
 
 
+MIN_PERIOD = 2.5e-3
+"""Interval in s below which an increment says nothing about a rate."""
+
+
 class DelayedImu(NamedTuple):
     """One filter period of inertial data: delta angle (3), delta velocity (3), both intervals."""
 
@@ -93,7 +97,6 @@ class Filter:
         self.cov = Covariance(params)
         self.rot: Array = np.eye(3)
         self.imu = DelayedImu(0, np.zeros(8), (False, False, False))
-        self.rate = np.zeros(3)
         self.t_now = 0
         self.t_horizon = 0
         self.dt_imu_avg = 0.0
@@ -131,6 +134,13 @@ class Filter:
     def recent(self, stamp_us: int, timeout_us: int) -> bool:
         """True when less than a timeout has passed since a stamp."""
         return stamp_us + timeout_us > self.t_now
+
+    @property
+    def rate(self) -> Array:
+        """Body rate (3,) in rad/s at the horizon, bias not removed."""
+        increments = self.imu.increments
+        rate: Array = increments[0:3] / max(float(increments[6]), MIN_PERIOD)
+        return rate
 
     @property
     def position(self) -> Array:

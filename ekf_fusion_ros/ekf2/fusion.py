@@ -38,9 +38,9 @@ def _fuse_pair(
     f: Filter, first: int, faults: tuple[str, str], innovation: Sequence[float],
     variance: Sequence[float],
 ) -> None:
-    for axis in (0, 1):
-        healthy = f.cov.fuse_direct(f.x, first + axis, variance[axis], innovation[axis])
-        setattr(f.faults, faults[axis], not healthy)
+    word = f.cov.fuse_pair(f.x, first, variance, innovation)
+    setattr(f.faults, faults[0], bool(word & 1))
+    setattr(f.faults, faults[1], bool(word & 2))
 
 
 def _judge_pair(

@@ -43,20 +43,23 @@ class InertialInput:
         self._sums = np.zeros(1)
         self._period = np.empty(8)
         self._clipping = NO_CLIPPING
+        self._moved = np.zeros(1, dtype=np.bool_)
+        self._limits = np.array((ANGLE_VIBRATION_LIMIT * moving_scaler,
+                                 VELOCITY_VIBRATION_LIMIT * moving_scaler, 0.0))
 
     def add(self, sample: ImuSample, in_air: bool) -> bool:
         """Take a raw sample; True when it completed a filter period."""
         dt = min(max(1e-6 * (sample.time_us - self.last_us), DT_MIN), DT_MAX)
         self.last_us = sample.time_us
         self.dt_avg = 0.8 * self.dt_avg + 0.2 * dt
+        self._limits[2] = RATE_LIMIT * self._moving_scaler * dt
         complete = take_imu(
             sample.delta_angle, sample.delta_velocity, sample.delta_angle_dt,
             sample.delta_velocity_dt, self._quat, self._velocity, self._clock, self._sums,
-            self._period, self._previous, self.vibration)
-        self._detect_rest(sample, dt, in_air)
-        if any(sample.clipping):
-            x, y, z = (
-                bool(a or b) for a, b in zip(self._clipping, sample.clipping, strict=True))
+            self._period, self._previous, self.vibration, self._limits, self._moved)
+        self._note_rest(sample.time_us, in_air)
+        if sample.clipping != NO_CLIPPING:
+            x, y, z = (bool(a or b) for a, b in zip(self._clipping, sample.clipping, strict=True))
             self._clipping = (x, y, z)
         if not complete:
             return False
@@ -67,19 +70,13 @@ class InertialInput:
         self.min_interval_us = span // (self._observation_length - 1)
         return True
 
-    def _detect_rest(self, sample: ImuSample, dt: float, in_air: bool) -> None:
-        scale = self._moving_scaler
-        angle = sample.delta_angle
-        moving = (
-            self.vibration[1] > ANGLE_VIBRATION_LIMIT * scale
-            or self.vibration[2] > VELOCITY_VIBRATION_LIMIT * scale
-            or angle.dot(angle) > (RATE_LIMIT * scale * dt) ** 2)
-        if moving:
-            self._last_vibration_us = sample.time_us
-        if moving or in_air:
-            self._last_move_us = sample.time_us
-        self.quiet = sample.time_us - self._last_vibration_us > REST_TIME_US
-        self.at_rest = sample.time_us - self._last_move_us > REST_TIME_US
+    def _note_rest(self, time_us: int, in_air: bool) -> None:
+        if self._moved[0]:
+            self._last_vibration_us = self._last_move_us = time_us
+        elif in_air:
+            self._last_move_us = time_us
+        self.quiet = time_us - self._last_vibration_us > REST_TIME_US
+        self.at_rest = time_us - self._last_move_us > REST_TIME_US
 
 
 def buffer_lengths(

@@ -31,10 +31,15 @@ class AccelBiasLearning:
                    or self.peaks[1] > imu.accel_bias_learn_accel_limit)
         inhibit_all = imu.inhibit_accel_bias or violent or f.faults.accel_vertical
         f.faults.accel_clipping = any(f.imu.clipping)
-        for axis in range(3):
-            inhibit = (inhibit_all or f.imu.clipping[axis]
-                       or not (f.flags.in_air or abs(f.rot[2, axis]) > OBSERVABLE_COS))
-            f.cov.inhibit_accel_bias(axis, inhibit)
+        if inhibit_all:
+            f.cov.inhibit_accel_bias((True, True, True))
+        elif f.flags.in_air:
+            f.cov.inhibit_accel_bias(f.imu.clipping)
+        else:
+            tilt = f.rot[2].tolist()
+            x, y, z = (clipped or abs(cosine) <= OBSERVABLE_COS
+                       for clipped, cosine in zip(f.imu.clipping, tilt, strict=True))
+            f.cov.inhibit_accel_bias((x, y, z))
 
     def check_consistency(self) -> None:
         """Forget a bias that both vertical velocity and height have opposed for 7 s."""

@@ -47,8 +47,12 @@ class YawEstimator:
         self._velocity = velocity[0:2].copy()
         self._accuracy = accuracy
 
-    def step(self, imu: Array, airborne: bool, airspeed: float, gyro_bias: Array) -> None:
-        """Advance by one filter period; imu (8,) raw increments, airspeed m/s (0 = unknown)."""
+    def step(self, imu: Array, airborne: bool, airspeed: float, bias: Array, dt: float) -> None:
+        """Advance by one filter period.
+
+        imu (8,) raw increments; airspeed m/s, 0 = unknown; bias (3,) rad per period of dt s of the
+        main filter, with which the references start.
+        """
         velocity, self._velocity = self._velocity, None
         if not self._tilt_aligned:
             self._velocity = velocity
@@ -57,7 +61,7 @@ class YawEstimator:
         advance_bank(self.rot, self.bias, self.state, self.cov, imu, self._accel, airspeed,
                      self.running)
         if airborne and velocity is not None:
-            self._use(velocity, gyro_bias)
+            self._use(velocity, bias / dt)
         elif not airborne:
             self.running = False
         if self.running:

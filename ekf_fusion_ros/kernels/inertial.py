@@ -79,10 +79,16 @@ def accumulate_imu(
 def take_imu(
     delta_angle: Array, delta_velocity: Array, angle_dt: float, velocity_dt: float,
     quat: Array, velocity: Array, clock: NDArray[np.float32], sums: Array, out: Array,
-    previous: Array, metrics: Array,
+    previous: Array, metrics: Array, limits: Array, moved: NDArray[np.bool_],
 ) -> bool:
-    """Run update_vibration and accumulate_imu on one raw sample."""
+    """Run update_vibration and accumulate_imu on one raw sample.
+
+    moved (1,) tells whether angle vibration, velocity vibration or the angle of this sample exceed
+    limits (3,) in rad, m/s and rad.
+    """
     update_vibration(delta_angle, delta_velocity, previous, metrics)
+    turned = math.sqrt(delta_angle[0] ** 2 + delta_angle[1] ** 2 + delta_angle[2] ** 2)
+    moved[0] = metrics[1] > limits[0] or metrics[2] > limits[1] or turned > limits[2]
     return accumulate_imu(delta_angle, delta_velocity, angle_dt, velocity_dt, quat, velocity,
                           clock, sums, out)
 

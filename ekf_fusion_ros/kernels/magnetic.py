@@ -6,6 +6,8 @@ h = R(q)' m_earth + m_body with R quadratic in q; with v the vector part of q,
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +15,12 @@ from ekf_fusion_ros.kernels.compile import kernel
 from ekf_fusion_ros.kernels.update import apply_update
 
 Array = NDArray[np.float64]
+
+DECLINATION_SPREAD = 0.5
+"""Largest deviation in rad of the field's direction from the declination."""
+
+VANISHED = 1e-3
+"""Share of the shortest field below which its direction means nothing."""
 
 
 @kernel
@@ -84,3 +92,44 @@ def fuse_field_axis(
                     wind_active):
         return 0
     return 2
+
+
+@kernel
+def limit_field(x: Array, declination: float, shortest: float) -> None:
+    """Keep the horizontal earth field (Gauss) long enough and within 0.5 rad of a declination."""
+    north, east = x[16], x[17]
+    length = math.hypot(north, east)
+    if length < shortest:
+        if length <= VANISHED * shortest:
+            x[16] = 2.0 * shortest * math.cos(declination)
+            x[17] = 2.0 * shortest * math.sin(declination)
+            return
+        north *= shortest / length
+        east *= shortest / length
+        length = shortest
+        x[16], x[17] = north, east
+    angle = math.atan2(east, north)
+    wanted = min(max(angle, declination - DECLINATION_SPREAD), declination + DECLINATION_SPREAD)
+    if wanted != angle:
+        x[16], x[17] = length * math.cos(wanted), length * math.sin(wanted)
+
+
+@kernel
+def fuse_field(
+    x: Array, p: Array, innovation: Array, axes: int, noise: float, all_states: bool,
+    declination: float, shortest: float, inhibited: Array, accel_bias_var_max: float,
+    wind_active: bool, variance: Array, outcome: Array,
+) -> None:
+    """Fuse the first axes one after the other, each with the Jacobian at the newest state.
+
+    outcome (3,) receives what fuse_field_axis returned; an innovation variance below the noise
+    ends the sequence.
+    """
+    for axis in range(axes):
+        outcome[axis] = fuse_field_axis(
+            x, p, axis, innovation[axis], noise, all_states, inhibited, accel_bias_var_max,
+            wind_active, variance)
+        if outcome[axis] == 1:
+            return
+        if outcome[axis] == 0:
+            limit_field(x, declination, shortest)

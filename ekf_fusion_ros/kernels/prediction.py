@@ -58,10 +58,10 @@ def predict_state(x: Array, rot: Array, imu: Array, earth_rate: Array, accel_lpf
 def advance_state(
     x: Array, rot: Array, imu: Array, earth_rate: Array, accel_lpf: Array, dt_avg: float,
     accel_bias_limit: float, peaks: Array, decay: float,
-) -> None:
-    """Predict and limit the state; peaks (2,) follow rate in rad/s and specific force in m/s^2.
+) -> float:
+    """Predict and limit the state; return the mean filter period in s, given that before.
 
-    A peak falls by the factor decay per period.
+    peaks (2,) follow rate in rad/s and specific force in m/s^2; they fall by the factor decay.
     """
     predict_state(x, rot, imu, earth_rate, accel_lpf)
     limit_state(x, dt_avg, accel_bias_limit)
@@ -69,6 +69,8 @@ def advance_state(
     force = math.sqrt(imu[3] ** 2 + imu[4] ** 2 + imu[5] ** 2) / NOMINAL_PERIOD
     peaks[0] = max(rate, decay * peaks[0])
     peaks[1] = max(force, decay * peaks[1])
+    mean_dt = min(max(0.5 * (imu[6] + imu[7]), 0.5 * NOMINAL_PERIOD), 2.0 * NOMINAL_PERIOD)
+    return 0.99 * dt_avg + 0.01 * mean_dt
 
 
 @kernel

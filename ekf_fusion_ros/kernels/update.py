@@ -107,3 +107,23 @@ def apply_direct(
     hp = p[state, :].copy()
     return apply_update(p, x, gain, hp, innovation, inhibited, accel_bias_var_max, mag_active,
                         wind_active)
+
+
+@kernel
+def apply_pair(
+    p: Array, x: Array, first: int, variance_a: float, variance_b: float, innovation_a: float,
+    innovation_b: float, inhibited: Array, accel_bias_var_max: float, mag_active: bool,
+    wind_active: bool,
+) -> int:
+    """Update with two neighbouring states, whose innovations were taken before the first.
+
+    Returns a word whose bit i tells that the update of observation i was unhealthy.
+    """
+    faults = 0
+    if not apply_direct(p, x, first, variance_a, innovation_a, inhibited, accel_bias_var_max,
+                        mag_active, wind_active):
+        faults += 1
+    if not apply_direct(p, x, first + 1, variance_b, innovation_b, inhibited, accel_bias_var_max,
+                        mag_active, wind_active):
+        faults += 2
+    return faults

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.state import BODY_FIELD
 from ekf_fusion_ros.ekf2.state import EARTH_FIELD
+from ekf_fusion_ros.kernels.magnetic import DECLINATION_SPREAD
+from ekf_fusion_ros.kernels.magnetic import limit_field
 from ekf_fusion_ros.kernels.magnetic import predict_field
 
 Array = NDArray[np.float64]
 
-DECLINATION_SPREAD = 0.5
 MIN_FIELD = 1e-3
 
 
@@ -57,25 +58,14 @@ def fuse_three_axes(f: Filter, measured: Array, all_states: bool) -> bool:
         record.reject()
         return False
     record.accept()
-    last = 2 if f.flags.synthetic_mag_z else 3
-    for axis in range(last):
-        if not _fuse_axis(f, axis, float(innovation[axis]), noise, all_states, variance):
-            break
-    record.variance[:] = variance.tolist()
-    return True
-
-
-def _fuse_axis(
-    f: Filter, axis: int, innovation: float, noise: float, all_states: bool, variance: Array,
-) -> bool:
-    name = ('mag_x', 'mag_y', 'mag_z')[axis]
-    outcome = f.cov.fuse_field_axis(f.x, axis, innovation, noise, all_states, variance)
-    setattr(f.faults, name, outcome != 0)
-    if outcome == 1:
+    outcome = np.zeros(3)
+    f.cov.fuse_field(f.x, innovation, 2 if f.flags.synthetic_mag_z else 3, noise, all_states,
+                     table_declination(f), shortest_field(f), variance, outcome)
+    faults = f.faults
+    faults.mag_x, faults.mag_y, faults.mag_z = (outcome != 0.0).tolist()
+    if (outcome == 1.0).any():
         _restart_field_covariance(f)
-        return False
-    if outcome == 0:
-        limit_declination(f)
+    record.variance[:] = variance.tolist()
     return True
 
 
@@ -107,31 +97,15 @@ def fuse_declination(f: Filter, sigma: float) -> None:
     f.observations.declination.record(f.t_now, (innovation,), (variance,), 0.0)
     f.observations.declination.accept()
     f.faults.declination = not f.cov.fuse(f.x, gain, hp, innovation)
-    limit_declination(f)
+    limit_field(f.x, table_declination(f), shortest_field(f))
 
 
-def limit_declination(f: Filter) -> None:
-    """Keep the horizontal earth field long enough and within 0.5 rad of the reference."""
-    reference = table_declination(f)
+def shortest_field(f: Filter) -> float:
+    """Return the shortest horizontal field that is plausible here, Gauss."""
     field = f.earth.field
-    shortest = MIN_FIELD
-    if field is not None:
-        shortest = max(MIN_FIELD, 0.5 * field.strength * math.cos(field.inclination))
-    north, east = float(f.x[16]), float(f.x[17])
-    length = math.hypot(north, east)
-    if length < shortest:
-        if length > MIN_FIELD * shortest:
-            north, east = north * shortest / length, east * shortest / length
-            f.x[16], f.x[17] = north, east
-        else:
-            f.x[16] = 2.0 * shortest * math.cos(reference)
-            f.x[17] = 2.0 * shortest * math.sin(reference)
-            return
-    angle = math.atan2(east, north)
-    wanted = min(max(angle, reference - DECLINATION_SPREAD), reference + DECLINATION_SPREAD)
-    if wanted != angle:
-        length = math.hypot(north, east)
-        f.x[16], f.x[17] = length * math.cos(wanted), length * math.sin(wanted)
+    if field is None:
+        return MIN_FIELD
+    return max(MIN_FIELD, 0.5 * field.strength * math.cos(field.inclination))
 
 
 def synthetic_z(f: Filter, measured: Array) -> float | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -90,10 +92,14 @@ class VisionPosition:
         if previous is None or jumped or sample.time_us <= previous.time_us:
             return
         interval = 1e-6 * (sample.time_us - previous.time_us)
-        # an unmeasured height must not reach x and y through the rotation
-        moved = (f.rot_ev @ np.nan_to_num(sample.position - previous.position))[0:2]
-        spread = np.diag(np.nan_to_num(sample.position_var + previous.position_var))
-        noise = np.diag(f.rot_ev @ spread @ f.rot_ev.T)[0:2] / interval ** 2
+        displacement = sample.position - previous.position
+        spread = sample.position_var + previous.position_var
+        if not math.isfinite(displacement[2]):
+            # an unmeasured height must not reach x and y through the rotation
+            displacement[2] = spread[2] = 0.0
+        rows = f.rot_ev[0:2]
+        moved = rows @ displacement
+        noise = (rows * rows) @ spread / interval ** 2
         fuse_horizontal_velocity(f, f.observations.ev_hor_pos,
                                  ((travelled - moved) / interval).tolist(),
                                  np.maximum(noise, NOISE_FLOOR).tolist(),
