@@ -35,7 +35,10 @@ class Fix:
     alt: float = 422.056
     velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
     nsats: int = 16
+    pdop: float = 1.0
     eph: float = 0.5
+    epv: float = 0.8
+    sacc: float = 0.2
 
 
 @dataclass
@@ -64,6 +67,7 @@ class Bench:
         self.rate = np.zeros(3)
         self.force = self.rot.T @ np.array((0.0, 0.0, -GRAVITY))
         self.field = self.rot.T @ EARTH_FIELD
+        self.clipping = (False, False, False)
         self.altitude = 122.2
         self.fix = Fix()
         self.odometry = Odometry(quaternion=quat_from_matrix(self.rot))
@@ -78,7 +82,8 @@ class Bench:
                 if sensor in self.sending and self.now_us % period_us == 0:
                     self.ekf.push(self._sample(sensor))
             dt = 1e-6 * STEP_US
-            self.ekf.push(ImuSample(self.now_us, self.rate * dt, self.force * dt, dt, dt))
+            self.ekf.push(ImuSample(self.now_us, self.rate * dt, self.force * dt, dt, dt,
+                                    self.clipping))
             self.ekf.update()
 
     def fly(self) -> None:
@@ -92,8 +97,8 @@ class Bench:
             return BaroSample(self.now_us, self.altitude)
         if sensor == 'fix':
             fix = self.fix
-            return GnssSample(self.now_us, fix.lat, fix.lon, fix.alt, fix.eph, 0.8,
-                              fix.velocity.copy(), 0.2, nsats=fix.nsats, pdop=1.0)
+            return GnssSample(self.now_us, fix.lat, fix.lon, fix.alt, fix.eph, fix.epv,
+                              fix.velocity.copy(), fix.sacc, nsats=fix.nsats, pdop=fix.pdop)
         odometry = self.odometry
         return VisionSample(self.now_us, odometry.position.copy(), odometry.quaternion.copy(),
                             odometry.velocity.copy(), odometry.position_var.copy(),

@@ -1,0 +1,108 @@
+"""The compass on the bench, and what happens when height sources misbehave."""
+
+from __future__ import annotations
+
+import math
+
+from ekf2.bench import EARTH_FIELD
+from ekf2.bench import Bench
+import numpy as np
+import pytest
+
+from ekf_fusion_ros.params.ekf2 import Ekf2Params
+from ekf_fusion_ros.params.ekf2 import GnssParams
+from ekf_fusion_ros.params.ekf2 import MagParams
+
+NO_FIXES = GnssParams(enabled=False)
+
+
+def compass(**mag):
+    bench = Bench(Ekf2Params(gnss=NO_FIXES, mag=MagParams(**mag)))
+    bench.run(4.5)
+    return bench
+
+
+def turned_field(yaw):
+    c, s = math.cos(yaw), math.sin(yaw)
+    return np.array(((c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0))) @ EARTH_FIELD
+
+
+@pytest.mark.parametrize('declination_deg', [0.0, 12.0, -40.0])
+def test_yaw_refers_to_true_north(declination_deg):
+    bench = compass(type='heading', declination_deg=declination_deg)
+    assert math.degrees(bench.attitude[2]) == pytest.approx(declination_deg, abs=0.1)
+    assert 'mag_hdg' in bench.flags
+
+
+def test_three_axes_on_request():
+    bench = compass(type='three_axis')
+    assert {'mag_3d', 'mag_dec'} <= bench.flags
+    np.testing.assert_allclose(bench.x[16:19], EARTH_FIELD, atol=0.01)
+
+
+def test_without_a_compass_yaw_is_not_aligned_but_its_variance_is_bounded():
+    bench = compass(type='none')
+    assert 'yaw_align' not in bench.flags
+    bench.run(20.0)
+    assert bench.p[0:4].sum() < 0.01
+
+
+def test_yaw_follows_a_turn():
+    bench = compass(type='heading')
+    bench.rate = np.array((0.0, 0.0, 0.5))
+    for k in range(200):
+        bench.field = turned_field(0.5 * 0.01 * (k + 1))
+        bench.run(0.01)
+    bench.rate = np.zeros(3)
+    bench.run(1.0)
+    assert bench.attitude[2] == pytest.approx(1.0, abs=0.01)
+    assert bench.ekf.nav_state().yaw_aligned
+
+
+def test_a_disturbed_field_does_not_turn_a_vehicle_at_rest():
+    bench = compass(type='heading', check_strength=True)
+    bench.field = 5.0 * turned_field(1.0)
+    bench.run(4.0)
+    assert 'mag_disturbed' in bench.flags
+    assert bench.attitude[2] == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_glitch_of_the_barometer_is_rejected_and_a_new_level_is_taken_in_time():
+    bench = Bench(Ekf2Params(gnss=NO_FIXES))
+    bench.run(8.0)
+    resets = bench.resets.pos_d
+    bench.altitude += 60.0
+    bench.run(3.0)
+    assert bench.x[9] == pytest.approx(0.0, abs=0.3)
+    (status,) = [s for s in bench.ekf.aid_statuses() if s.name == 'baro_height']
+    assert status.innovation_rejected
+    assert status.rejected > 30
+    bench.run(4.0)
+    assert bench.resets.pos_d == resets + 1
+    assert bench.x[9] == pytest.approx(-60.0, abs=1.0)
+    assert any('height source timed out' in event.text for event in bench.ekf.drain_events())
+
+
+def test_the_output_jumps_with_a_reset_of_the_filter():
+    bench = Bench(Ekf2Params(gnss=NO_FIXES))
+    bench.run(8.0)
+    before, resets = bench.ekf.nav_state().position[2], bench.resets.pos_d
+    bench.altitude += 60.0
+    while bench.resets.pos_d == resets:
+        bench.run(0.01)
+    jump = bench.resets.d_pos_d
+    assert jump == pytest.approx(-60.0, abs=1.0)
+    assert bench.ekf.nav_state().position[2] - before == pytest.approx(jump, abs=0.5)
+
+
+def test_an_accelerometer_at_its_range_raises_the_velocity_noise():
+    bench = Bench()
+    bench.run(5.0)
+    before = bench.p[4:7].copy()
+    bench.clipping = (False, False, True)
+    bench.run(0.5)
+    assert bench.ekf.filter.faults.accel_clipping
+    # 4.9 m/s^2 in steps of 10 ms for half a second, less what the barometer takes away.
+    growth = 50 * 0.049 ** 2
+    assert 0.4 * growth < bench.p[6] - before[2] < growth
+    assert abs(bench.p[4] - before[0]) < 0.1 * growth
