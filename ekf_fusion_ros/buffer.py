@@ -44,12 +44,6 @@ class SampleBuffer(Generic[T]):
         for index, (time_us, sample) in enumerate(self._waiting):
             self._waiting[index] = (time_us, change(sample))
 
-    def clear(self) -> None:
-        """Drop every waiting sample."""
-        self.missed += len(self._waiting)
-        self._waiting.clear()
-        self.newest_time_us = 0
-
     def pop_first_older_than(self, time_us: int) -> tuple[int, T] | None:
         """Take the newest sample with t <= time_us < t + 100 ms, and drop all before it."""
         waiting = self._waiting

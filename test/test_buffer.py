@@ -70,11 +70,3 @@ def test_nothing_in_nothing_out():
 def test_waiting_samples_can_be_changed(three):
     three.replace(str.upper)
     assert three.pop_first_older_than(200_000) == (200_000, 'B')
-
-
-def test_cleared(three):
-    three.clear()
-    assert len(three) == 0
-    assert three.missed == 3
-    assert three.newest_time_us == 0
-    assert three.pop_first_older_than(300_000) is None

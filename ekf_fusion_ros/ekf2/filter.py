@@ -47,6 +47,8 @@ class GnssFix(NamedTuple):
     vacc: float
     sacc: float
     has_velocity: bool
+    lat: float
+    lon: float
 
 
 class VerticalCheck(NamedTuple):

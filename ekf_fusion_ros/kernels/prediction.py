@@ -69,7 +69,8 @@ def advance_state(
     force = math.sqrt(imu[3] ** 2 + imu[4] ** 2 + imu[5] ** 2) / NOMINAL_PERIOD
     peaks[0] = max(rate, decay * peaks[0])
     peaks[1] = max(force, decay * peaks[1])
-    mean_dt = min(max(0.5 * (imu[6] + imu[7]), 0.5 * NOMINAL_PERIOD), 2.0 * NOMINAL_PERIOD)
+    mean_dt = float(0.5 * (imu[6] + imu[7]))
+    mean_dt = min(max(mean_dt, 0.5 * NOMINAL_PERIOD), 2.0 * NOMINAL_PERIOD)
     return 0.99 * dt_avg + 0.01 * mean_dt
 
 

@@ -123,6 +123,9 @@ class GnssParams:
                             px4='EKF2_GPS_V_GATE', ecl='gps_vel_innov_gate')
     pos_gate: float = param(5.0, 'Innovation gate of position.', unit='sigma', min=1, max=100,
                             px4='EKF2_GPS_P_GATE', ecl='gps_pos_innov_gate')
+    place_early_fixes: bool = param(
+        True, 'Give the fixes that wait when the origin is set their place; PX4 takes them to be '
+        'at the origin.')
     reset_at_start: bool = param(
         True, 'Jump to the fix whenever aiding starts. Off, a position that dead reckoning has '
         'kept since the last fix is corrected instead, where the fix passes the gate.')

@@ -22,7 +22,7 @@ def push_forward(yaw, seconds, noise=0.0, seed=0):
         forward = 0.0 if begin else 3.0 * math.cos(2.0 * math.pi * (k * DT - 1.0) / 5.0)
         speed += forward * DT
         imu = np.concatenate([np.zeros(3), np.array((forward, 0.0, -GRAVITY)) * DT, [DT, DT]])
-        bank.step(imu, not begin, 0.0)
+        bank.step(imu, not begin, 0.0, np.zeros(3), DT)
         if k % 20 == 0:
             measured = speed * nose + noise * rng.normal(size=2)
             bank.set_velocity(measured, max(noise, 0.1), np.zeros(3))

@@ -75,28 +75,29 @@ class Gnss:
             f.earth.look_around(sample.lat, sample.lon, sample.time_us)
             f.yaw_reset_requested |= not known_before and f.params.mag.type != 'none'
         delay_us = round(f.params.gnss.delay_ms * 1000) + FILTER_PERIOD_US // 2
-        self.buffer.push(sample.time_us - delay_us, self._to_local(sample))
+        fix = GnssFix(sample.time_us - delay_us, np.zeros(2), sample.alt, sample.velocity,
+                      sample.eph, sample.epv, sample.sacc, sample.has_velocity, sample.lat,
+                      sample.lon)
+        self.buffer.push(fix.time_us, self._placed(fix))
         return origin_set
 
-    def _to_local(self, sample: GnssSample) -> GnssFix:
-        f = self._f
-        position = np.zeros(2)
-        if f.earth.projection is not None:
-            position[:] = f.earth.projection.project(sample.lat, sample.lon)
-        delay_us = round(f.params.gnss.delay_ms * 1000) + FILTER_PERIOD_US // 2
-        return GnssFix(sample.time_us - delay_us, position, sample.alt, sample.velocity,
-                       sample.eph, sample.epv, sample.sacc, sample.has_velocity)
+    def _placed(self, fix: GnssFix) -> GnssFix:
+        """Return a fix with its position in the local frame, which is zero without an origin."""
+        projection = self._f.earth.projection
+        if projection is None:
+            return fix
+        return fix._replace(position=np.array(projection.project(fix.lat, fix.lon)))
 
     def _set_origin(self, sample: GnssSample) -> None:
         """Tie the local frame to the earth so that a position already in use stays valid."""
         f = self._f
-        # fixes that came before had no place in the local frame
-        self.buffer.clear()
         altitude = sample.alt
         if f.flags.aided_horizontally():
             f.earth.set_origin_from(sample.lat, sample.lon, altitude, f.position)
         else:
             f.earth.set_origin(sample.lat, sample.lon, altitude + float(f.x[9]))
+        if f.params.gnss.place_early_fixes:
+            self.buffer.replace(self._placed)
         known_before = f.earth.field is not None
         f.earth.look_around(sample.lat, sample.lon, sample.time_us)
         if f.params.mag.type == 'none':
@@ -117,15 +118,12 @@ class Gnss:
         place = None if before is None else before.reproject(float(f.x[7]), float(f.x[8]))
         f.earth.set_origin(origin.lat, origin.lon, origin.alt)
         f.earth.look_around(origin.lat, origin.lon, f.t_now)
-        if before is None or place is None or f.earth.projection is None:
-            self.buffer.clear()
-            return True
-        position = np.array(f.earth.projection.project(*place))
-        shift = position - f.x[7:9]
-        self.buffer.replace(lambda fix: fix._replace(position=fix.position + shift))
+        self.buffer.replace(self._placed)
         if f.fix is not None:
-            f.fix = f.fix._replace(position=f.fix.position + shift)
-        self._resets.move_horizontally(shift)
+            f.fix = self._placed(f.fix)
+        if place is None or f.earth.projection is None:
+            return True
+        self._resets.move_horizontally(np.array(f.earth.projection.project(*place)) - f.x[7:9])
         self._resets.move_vertically(origin.alt - altitude_before)
         return True
 
