@@ -25,7 +25,7 @@ def push_forward(yaw, seconds, noise=0.0, seed=0):
         bank.step(imu, not begin, 0.0, np.zeros(3), DT)
         if k % 20 == 0:
             measured = speed * nose + noise * rng.normal(size=2)
-            bank.set_velocity(measured, max(noise, 0.1), np.zeros(3))
+            bank.set_velocity(measured, max(noise, 0.1))
     return bank
 
 
