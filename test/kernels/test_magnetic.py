@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from hypothesis import given
 from hypothesis import settings
 import numpy as np
@@ -15,7 +17,9 @@ from oracles import vectors
 import pytest
 
 from ekf_fusion_ros.kernels.magnetic import field_jacobian
+from ekf_fusion_ros.kernels.magnetic import fuse_field
 from ekf_fusion_ros.kernels.magnetic import fuse_field_axis
+from ekf_fusion_ros.kernels.magnetic import limit_field
 from ekf_fusion_ros.kernels.magnetic import predict_field
 
 NOISE = 0.05 ** 2
@@ -77,3 +81,34 @@ def test_young_field_states_take_all_of_the_correction():
     np.testing.assert_allclose(x[0:16], before[0:16], atol=1e-15)
     np.testing.assert_array_equal(x[22:24], before[22:24])
     assert abs(x[16] - before[16]) > 1e-4
+
+
+@pytest.mark.parametrize('axes', [1, 2, 3])
+def test_axes_in_sequence_are_one_vector_observation(axes):
+    q = np.array((0.5, 0.1, -0.3, 0.8))
+    x = state(q / np.linalg.norm(q), np.array((0.2, 0.05, 0.43)), np.array((0.02, -0.01, 0.0)))
+    p, before = covariance(11), x.copy()
+    h = difference(field_in_body, x, 1e-2)[0:axes]
+    expected = np.linalg.inv(np.linalg.inv(p) + h.T @ h / NOISE)
+    out, outcome = p.copy(), np.zeros(3)
+    # Nothing was wrong, so that all axes are fused about the same state.
+    fuse_field(x, out, np.zeros(3), axes, NOISE, True, 0.24, 1e-3, NO_AXIS, 1.0, True,
+               np.zeros(3), outcome)
+    np.testing.assert_allclose(out, expected, rtol=1e-6, atol=1e-10)
+    np.testing.assert_allclose(x, before, atol=1e-12)
+    assert not outcome.any()
+
+
+@pytest.mark.parametrize(('north', 'east', 'length', 'angle'), [
+    (0.2, 0.05, math.hypot(0.2, 0.05), math.atan2(0.05, 0.2)),
+    (0.2, 0.4, math.hypot(0.2, 0.4), 0.1 + 0.5),
+    (0.2, -0.4, math.hypot(0.2, 0.4), 0.1 - 0.5),
+    (0.03, 0.01, 0.1, math.atan2(0.01, 0.03)),
+    (1e-6, -1e-6, 0.2, 0.1),
+], ids=['sound', 'too far east', 'too far west', 'too short', 'vanished'])
+def test_limits_of_the_earth_field(north, east, length, angle):
+    x = np.full(24, 7.0)
+    x[16:18] = north, east
+    limit_field(x, 0.1, 0.1)
+    np.testing.assert_allclose(x[16:18], (length * math.cos(angle), length * math.sin(angle)))
+    assert np.count_nonzero(x == 7.0) == 22

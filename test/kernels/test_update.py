@@ -10,6 +10,7 @@ from oracles import seeds
 import pytest
 
 from ekf_fusion_ros.kernels.update import apply_direct
+from ekf_fusion_ros.kernels.update import apply_pair
 from ekf_fusion_ros.kernels.update import apply_update
 from ekf_fusion_ros.kernels.update import limit_covariance
 
@@ -51,6 +52,26 @@ def test_direct_observation_of_a_state(seed):
     assert apply_direct(out, x, 8, p[8, 8] + noise, 2.0, FREE, WIDE, True, True)
     np.testing.assert_allclose(out, expected, rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(x[8], before - 2.0 * p[8, 8] / (p[8, 8] + noise))
+
+
+def test_a_pair_uses_the_innovations_from_before_the_first():
+    p, x = covariance(6), state(6)
+    before, out = x.copy(), p.copy()
+    variance = np.array((p[7, 7] + 0.4, p[8, 8] + 0.6))
+    assert apply_pair(out, x, 7, *variance, 0.5, -0.2, FREE, WIDE, True, True) == 0
+    first = p - np.outer(p[:, 7], p[7]) / variance[0]
+    second = first - np.outer(first[:, 8], first[8]) / variance[1]
+    np.testing.assert_allclose(out, second, rtol=1e-9, atol=1e-12)
+    moved = before - 0.5 * p[:, 7] / variance[0] + 0.2 * first[:, 8] / variance[1]
+    np.testing.assert_allclose(x[4:], moved[4:], atol=1e-12)
+
+
+@pytest.mark.parametrize(('bad', 'word'), [(7, 1), (8, 2)])
+def test_a_pair_tells_which_observation_was_unhealthy(bad, word):
+    p, x = covariance(6), state(6)
+    variance = {7: p[7, 7] + 0.4, 8: p[8, 8] + 0.6}
+    variance[bad] = 0.5 * p[bad, bad]
+    assert apply_pair(p, x, 7, variance[7], variance[8], 0.1, 0.1, FREE, WIDE, True, True) == word
 
 
 def test_an_update_that_would_make_a_variance_negative_is_refused():
