@@ -53,7 +53,7 @@ def test_without_motion_nothing_is_known():
     for k in range(1000):
         bank.step(at_rest, True, 0.0, np.zeros(3), DT)
         if k % 20 == 0:
-            bank.set_velocity(np.zeros(2), 0.3, np.zeros(3))
+            bank.set_velocity(np.zeros(2), 0.3)
     assert bank.running
     assert math.sqrt(bank.variance) > 1.0
 
@@ -62,7 +62,7 @@ def test_it_waits_on_the_ground():
     bank = YawEstimator()
     at_rest = np.concatenate([np.zeros(3), (0.0, 0.0, -GRAVITY * DT), [DT, DT]])
     for _ in range(100):
-        bank.set_velocity(np.zeros(2), 0.3, np.zeros(3))
+        bank.set_velocity(np.zeros(2), 0.3)
         bank.step(at_rest, False, 0.0, np.zeros(3), DT)
     assert not bank.running
 
