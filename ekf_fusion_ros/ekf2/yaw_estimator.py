@@ -85,7 +85,9 @@ class YawEstimator:
         if not 0.9 * GRAVITY < norm < 1.1 * GRAVITY:
             return
         down = -delta_velocity / np.linalg.norm(delta_velocity)
-        north = np.array((1.0, 0.0, 0.0)) - down * down[0]
+        # any horizontal axis will do; forward is none where the nose points up or down
+        forward = np.array((1.0, 0.0, 0.0) if abs(down[0]) < 0.999 else (0.0, 1.0, 0.0))
+        north = forward - down * (forward @ down)
         north /= np.linalg.norm(north)
         self.rot[:] = np.vstack((north, np.cross(down, north), down))
         self._tilt_aligned = True

@@ -67,9 +67,12 @@ def test_it_waits_on_the_ground():
     assert not bank.running
 
 
-def test_tilt_at_the_start_is_that_of_gravity():
+@pytest.mark.parametrize(('pitch', 'roll'), [
+    (0.3, -0.5), (0.0, math.pi), (0.5 * math.pi, 0.0), (-0.5 * math.pi, 0.0)])
+def test_tilt_at_the_start_is_that_of_gravity(pitch, roll):
     rotation = pytest.importorskip('scipy.spatial.transform').Rotation
-    tilt = rotation.from_euler('ZYX', (0.0, 0.3, -0.5)).as_matrix()
+    tilt = rotation.from_euler('ZYX', (0.0, pitch, roll)).as_matrix()
+    tilt[np.abs(tilt) < 1e-15] = 0.0
     bank = YawEstimator()
     force = tilt.T @ np.array((0.0, 0.0, -GRAVITY))
     bank.step(np.concatenate([np.zeros(3), force * DT, [DT, DT]]), False, 0.0, np.zeros(3), DT)
