@@ -94,6 +94,8 @@ class Filter:
     def __init__(self, params: Ekf2Params, history: int) -> None:
         """Start level at rest; history is the number of filter periods back to the horizon."""
         self.params = params
+        self.gnss_lever = lever_arm(params.gnss.position, params)
+        self.vision_lever = lever_arm(params.vision.position, params)
         self.x: Array = np.zeros(SIZE)
         self.x[0] = 1.0
         self.cov = Covariance(params)
@@ -153,3 +155,9 @@ class Filter:
     def velocity(self) -> Array:
         """Velocity (3,) NED in m/s."""
         return self.x[4:7]
+
+
+def lever_arm(sensor: tuple[float, float, float], params: Ekf2Params) -> Array | None:
+    """Return the vector (3,) from the IMU to a sensor in the body, None where they coincide."""
+    lever = np.subtract(sensor, params.imu.position)
+    return lever if lever.any() else None

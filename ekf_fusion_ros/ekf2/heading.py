@@ -8,13 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.filter import Filter
-from ekf_fusion_ros.ekf2.resets import refresh_rotation
 from ekf_fusion_ros.ekf2.state import SECOND
+from ekf_fusion_ros.kernels.heading import level_heading
+from ekf_fusion_ros.kernels.heading import observe_yaw
+from ekf_fusion_ros.kernels.heading import refresh_yaw
 from ekf_fusion_ros.mathlib.angles import wrap_pi
-from ekf_fusion_ros.mathlib.rotation import rolls_more_than_pitches
-from ekf_fusion_ros.mathlib.rotation import with_yaw
-from ekf_fusion_ros.mathlib.rotation import yaw_312
-from ekf_fusion_ros.mathlib.rotation import yaw_321
 
 Array = NDArray[np.float64]
 
@@ -25,27 +23,6 @@ QUAT_VARIANCE_MAX = 1e-4
 GROUND_SETTLING_US = 5 * SECOND
 
 
-def yaw_jacobian(q: Array, sequence_321: bool) -> Array | None:
-    """Return d(yaw)/d(q), (4,), of yaw = atan2(y, x); None at the singularity.
-
-    321: y = 2(q0 q3 + q1 q2), x = q0^2 + q1^2 - q2^2 - q3^2.
-    312: y = 2(q0 q3 - q1 q2), x = q0^2 - q1^2 + q2^2 - q3^2.
-    """
-    q0, q1, q2, q3 = q
-    if sequence_321:
-        y, x = 2.0 * (q0 * q3 + q1 * q2), q0 * q0 + q1 * q1 - q2 * q2 - q3 * q3
-        dy = np.array((q3, q2, q1, q0))
-        dx = np.array((q0, q1, -q2, -q3))
-    else:
-        y, x = 2.0 * (q0 * q3 - q1 * q2), q0 * q0 - q1 * q1 + q2 * q2 - q3 * q3
-        dy = np.array((q3, -q2, -q1, q0))
-        dx = np.array((q0, -q1, q2, -q3))
-    if x * x <= 1e-6 and y * y <= 1e-6:
-        return None
-    jacobian: Array = 2.0 * (x * dy - y * dx) / (x * x + y * y)
-    return jacobian
-
-
 class HeadingFusion:
     """Fuses measured yaw, and holds yaw where nothing measures it."""
 
@@ -54,12 +31,11 @@ class HeadingFusion:
         self._f = f
         self.last_static_yaw = 0.0
         self.covariance_lost = False
+        self._jacobian = np.zeros(4)
 
     def predicted_yaw(self) -> float:
         """Renew the cached rotation and return its yaw by the better sequence, rad."""
-        refresh_rotation(self._f)
-        rot = self._f.rot
-        return yaw_321(rot) if rolls_more_than_pitches(rot) else yaw_312(rot)
+        return float(refresh_yaw(self._f.x[0:4], self._f.rot))
 
     def fuse_measured(self, measured: float, noise: float) -> None:
         """Fuse a yaw in rad with a variance in rad^2."""
@@ -90,23 +66,23 @@ class HeadingFusion:
     def _fuse(self, innovation: float, noise: float) -> None:
         f = self._f
         noise = max(noise, YAW_NOISE_FLOOR)
-        jacobian = yaw_jacobian(f.x[0:4], rolls_more_than_pitches(f.rot))
-        if jacobian is None:
+        gain = np.empty(24)
+        known = observe_yaw(f.x[0:4], f.rot, f.cov.p, self._jacobian, gain)
+        if math.isnan(known):
             return
-        variance = float(jacobian @ f.cov.p[0:4, 0:4] @ jacobian) + noise
-        if variance < noise:
-            f.faults.heading = True
+        f.faults.heading = known < 0.0
+        if f.faults.heading:
             self.covariance_lost = True
             return
-        f.faults.heading = False
-        gain = (f.cov.p[:, 0:4] @ jacobian) / variance
+        variance = known + noise
+        gain /= variance
         gain[16:22] = 0.0
         if not f.flags.wind:
             gain[22:24] = 0.0
         innovation = self._gate(innovation, variance)
         if math.isnan(innovation):
             return
-        hp = jacobian @ f.cov.p[0:4, :]
+        hp = self._jacobian @ f.cov.p[0:4, :]
         f.faults.heading = not f.cov.fuse(f.x, gain, hp, innovation)
 
     def _gate(self, innovation: float, variance: float) -> float:
@@ -135,5 +111,4 @@ class HeadingFusion:
 
 def mag_yaw(f: Filter, field_body: Array, declination: float) -> float:
     """Return the yaw in rad that a field (3,) in body axes implies at the current tilt."""
-    level = with_yaw(f.rot, 0.0) @ field_body
-    return wrap_pi(-math.atan2(level[1], level[0]) + declination)
+    return wrap_pi(float(level_heading(f.rot, field_body)) + declination)

@@ -12,7 +12,6 @@ from ekf_fusion_ros.ekf2.state import PN
 from ekf_fusion_ros.ekf2.state import VD
 from ekf_fusion_ros.ekf2.state import VN
 from ekf_fusion_ros.mathlib.rotation import cross
-from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
 from ekf_fusion_ros.mathlib.rotation import quat_from_matrix
 from ekf_fusion_ros.mathlib.rotation import quat_inverse
 from ekf_fusion_ros.mathlib.rotation import quat_multiply
@@ -146,7 +145,7 @@ class Resets:
         elif f.flags.ev_vel and f.vision is not None and f.vision.has_velocity:
             f.events.add(f.t_now, EventKind.VEL_RESET_VISION)
             velocity, covariance = vision_velocity_in_filter_frame(f, f.vision)
-            variance = np.diag(covariance)
+            variance = covariance.diagonal()
             if f.params.vision.velocity_tells_attitude:
                 # Its direction hangs on the attitude; the fusion that follows makes that known.
                 variance = variance + DIFFUSE * (1.0 + float(velocity @ velocity))
@@ -198,8 +197,7 @@ def vision_velocity_in_filter_frame(f: Filter, sample: VisionSample) -> tuple[Ar
 
     Removes the lever arm of the sensor with the delayed rate.
     """
-    lever = np.subtract(f.params.vision.position, f.params.imu.position)
-    swing = cross(f.rate, lever)
+    swing = np.zeros(3) if f.vision_lever is None else cross(f.rate, f.vision_lever)
     if sample.velocity_frame is VelocityFrame.BODY_FRD:
         return (f.rot @ (sample.velocity - swing),
                 f.rot @ sample.velocity_cov @ f.rot.T)
@@ -207,13 +205,3 @@ def vision_velocity_in_filter_frame(f: Filter, sample: VisionSample) -> tuple[Ar
         return (f.rot_ev @ sample.velocity - f.rot @ swing,
                 f.rot_ev @ sample.velocity_cov @ f.rot_ev.T)
     return sample.velocity - f.rot @ swing, sample.velocity_cov
-
-
-def rotation_to_filter_frame(q: Array, q_vision: Array) -> Array:
-    """Return the matrix (3, 3) from the odometry to the filter frame, given one body in both."""
-    return matrix_from_quat(quat_normalise(quat_multiply(q, quat_inverse(q_vision))))
-
-
-def refresh_rotation(f: Filter) -> None:
-    """Renew the cached rotation from the attitude state."""
-    f.rot = matrix_from_quat(f.x[0:4])

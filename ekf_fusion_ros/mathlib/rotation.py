@@ -78,6 +78,12 @@ def matrix_from_quat(q: Array) -> Array:
     return rot
 
 
+@kernel
+def relative_rotation(p: Array, q: Array) -> Array:
+    """Return the matrix (3, 3) of p q^-1: from the frame q leads to, to that of p."""
+    return matrix_from_quat(quat_normalise(quat_multiply(p, quat_inverse(q))))
+
+
 def quat_from_matrix(rot: Array) -> Array:
     """Return the quaternion (4,) of a rotation matrix, pivoting on the largest component.
 

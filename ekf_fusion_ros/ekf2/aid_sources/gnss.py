@@ -252,9 +252,9 @@ class Gnss:
         """Move the fix from the antenna to the IMU."""
         f = self._f
         assert f.fix is not None
-        lever = np.subtract(f.params.gnss.position, f.params.imu.position)
         sacc = max(f.fix.sacc, f.params.gnss.vel_noise)
-        if not lever.any():
+        lever = f.gnss_lever
+        if lever is None:
             f.fix = f.fix._replace(sacc=sacc)
             return
         arm = f.rot @ lever

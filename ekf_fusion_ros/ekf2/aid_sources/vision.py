@@ -16,9 +16,9 @@ from ekf_fusion_ros.ekf2.events import EventKind
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.heading import HeadingFusion
 from ekf_fusion_ros.ekf2.resets import Resets
-from ekf_fusion_ros.ekf2.resets import rotation_to_filter_frame
 from ekf_fusion_ros.ekf2.state import FILTER_PERIOD_US
 from ekf_fusion_ros.ekf2.state import SECOND
+from ekf_fusion_ros.mathlib.rotation import relative_rotation
 from ekf_fusion_ros.samples import VisionSample
 
 Array = NDArray[np.float64]
@@ -81,7 +81,7 @@ class Vision:
             flags.ev_yaw = False
         rotates = params.rotate and (params.use_position or params.use_velocity)
         if rotates and not flags.ev_yaw and sample.has_attitude:
-            f.rot_ev = rotation_to_filter_frame(f.x[0:4], sample.quaternion)
+            f.rot_ev = relative_rotation(f.x[0:4], sample.quaternion)
             self.heading.step(sample)
         recent = f.recent(self.last_arrival_us, RECENT_US)
         if recent and flags.tilt_align and flags.yaw_align:
@@ -105,8 +105,7 @@ class Vision:
     def _at_imu(self, sample: VisionSample) -> VisionSample:
         """Move the position from the vision sensor to the IMU."""
         f = self._f
-        lever = np.subtract(f.params.vision.position, f.params.imu.position)
-        if not lever.any():
+        if f.vision_lever is None:
             return sample
-        return dataclasses.replace(sample, position=sample.position - f.rot @ lever)
+        return dataclasses.replace(sample, position=sample.position - f.rot @ f.vision_lever)
 

@@ -8,8 +8,8 @@ from ekf_fusion_ros.ekf2.covariance import rotation_vector_variances
 from ekf_fusion_ros.ekf2.events import EventKind
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.resets import Resets
-from ekf_fusion_ros.ekf2.resets import rotation_to_filter_frame
 from ekf_fusion_ros.mathlib.angles import wrap_pi
+from ekf_fusion_ros.mathlib.rotation import relative_rotation
 from ekf_fusion_ros.mathlib.rotation import yaw_321
 from ekf_fusion_ros.mathlib.rotation import yaw_of
 from ekf_fusion_ros.samples import HeadingSample
@@ -43,7 +43,7 @@ class VisionHeading:
         f.cov.set_attitude(f.x[0:4], variances)
         if f.flags.ev_vel:
             self._resets.velocity_to_aiding(False)
-        f.rot_ev = rotation_to_filter_frame(f.x[0:4], vision.quaternion)
+        f.rot_ev = relative_rotation(f.x[0:4], vision.quaternion)
         f.flags.yaw_align = True
         f.events.add(f.t_now, EventKind.YAW_ALIGNED_MOTION,
                      f'odometry heading {math.degrees(sample.yaw):.0f} deg, '

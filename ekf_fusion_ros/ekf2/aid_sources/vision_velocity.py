@@ -49,13 +49,13 @@ class VisionVelocity:
         if f.late(f.times.hor_vel, round(f.params.aiding.reset_timeout * SECOND)):
             if f.late(f.times.flow, OTHER_AID_US) and f.late(f.times.hor_pos, OTHER_AID_US):
                 self._resets.velocity_to_aiding(gnss_healthy)
-        noise = np.maximum(np.diag(covariance), NOISE_FLOOR)
+        noise = np.maximum(covariance.diagonal(), NOISE_FLOOR)
         f.last_velocity = velocity[0:2]
         f.last_velocity_variance = noise[0:2]
         gate = f.params.vision.vel_gate
         in_body = sample.velocity_frame is VelocityFrame.BODY_FRD
         if in_body and f.params.vision.velocity_tells_attitude:
-            noise = np.maximum(np.diag(f.rot.T @ covariance @ f.rot), NOISE_FLOOR)
+            noise = np.maximum((f.rot.T @ covariance @ f.rot).diagonal(), NOISE_FLOOR)
             fuse_body_velocity(f, f.observations.ev_hor_vel, f.observations.ev_ver_vel,
                                f.rot.T @ velocity, noise, gate)
             return
