@@ -56,7 +56,7 @@ class Odometry:
 class Bench:
     """Runs the filter on sensor values that hold until they are changed.
 
-    `sending` names the sensors that are on, beside the IMU.
+    `sending` names the sensors that are on, beside the IMU; `turned` is for tests that turn.
     """
 
     def __init__(self, params: Ekf2Params | None = None, roll: float = 0.0, pitch: float = 0.0,
@@ -72,6 +72,7 @@ class Bench:
         self.fix = Fix()
         self.odometry = Odometry(quaternion=quat_from_matrix(self.rot))
         self.sending = {'mag', 'baro'}
+        self.turned = 0.0
         self.now_us = 0
 
     def run(self, seconds: float) -> None:
