@@ -81,7 +81,7 @@ def swap_attitude_child(quaternion: Array) -> Array:
 def rotate_covariance(covariance: Array, rotation: Array) -> Array:
     """Return C' = T C T' for C (3, 3) with T the rotation, or (6, 6) with T = blkdiag of two."""
     if covariance.shape == (3, 3):
-        return np.asarray(rotation @ covariance @ rotation.T)
+        return np.asarray(rotation.dot(covariance).dot(rotation.T))
     turned = np.empty((6, 6))
     for row in (slice(0, 3), slice(3, 6)):
         for column in (slice(0, 3), slice(3, 6)):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 import heapq
 from typing import Any
 
@@ -31,14 +31,20 @@ class Holding:
         entry = (sample.time_us, RANK[role], self._sequence, role, sample)
         heapq.heappush(self._heap, entry)
 
-    def release(self, now_us: int | None) -> Iterator[tuple[str, Any]]:
-        """Yield what is due before the inertial stamp `now_us`; None: before there is one."""
+    def release(self, now_us: int | None) -> Sequence[tuple[str, Any]]:
+        """Return what is due before the inertial stamp `now_us`; None: before there is one."""
         limit = -1 if now_us is None else now_us - self._hold_us
         heap = self._heap
+        # Asked before every inertial step, mostly in vain.
+        if not heap or (heap[0][0] > limit and len(heap) <= HELD_MAX):
+            return ()
+        due = []
         while heap and (heap[0][0] <= limit or len(heap) > HELD_MAX):
-            yield heapq.heappop(heap)[3:]
+            due.append(heapq.heappop(heap)[3:])
+        return due
 
-    def flush(self) -> Iterator[tuple[str, Any]]:
-        """Yield everything, oldest stamp first."""
-        while self._heap:
-            yield heapq.heappop(self._heap)[3:]
+    def flush(self) -> Sequence[tuple[str, Any]]:
+        """Return everything, oldest stamp first."""
+        due = [entry[3:] for entry in sorted(self._heap)]
+        self._heap.clear()
+        return due

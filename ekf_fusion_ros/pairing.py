@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from ekf_fusion_ros.messages.decode_fix import FixVelocity
@@ -37,8 +38,10 @@ class FixPairing:
         self._velocities.append(velocity)
         return [self._pair(velocity)] if self._matches(velocity) else []
 
-    def advance(self, now_us: int) -> list[GnssSample]:
+    def advance(self, now_us: int) -> Sequence[GnssSample]:
         """Return the fix whose wait is over at inertial time `now_us`."""
+        if self._fix is None and not self._velocities:
+            return ()
         limit = now_us - self._wait_us
         while self._velocities and self._velocities[0].time_us < limit - self._tolerance_us:
             self._drop(self._velocities.pop(0))

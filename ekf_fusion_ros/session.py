@@ -266,7 +266,8 @@ class FusionSession:
             for due in self._holding.release(imu.time_us):
                 self._aid(*due)
             if self._pairing is not None:
-                self._push_fixes(self._pairing.advance(imu.time_us))
+                for fix in self._pairing.advance(imu.time_us):
+                    self._push_fix(fix)
             outputs += self._advance(imu)
         return outputs
 

@@ -42,10 +42,11 @@ class InertialOrder:
             self.last = time_us
             return Step.FIRST
         step = time_us - self.last
-        if abs(step) <= self._jump_us:
-            check_advance(time_us, self.last)
+        if 0 < step <= self._jump_us:
             self.last, self._suspect = time_us, None
             return Step.FORWARD
+        if -self._jump_us <= step <= 0:
+            check_advance(time_us, self.last)
         if self._suspect is not None and 0 < time_us - self._suspect <= self._jump_us:
             self.last, self._suspect = time_us, None
             return Step.RESTART

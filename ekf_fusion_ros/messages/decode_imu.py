@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,7 @@ Array = NDArray[np.float64]
 ABSENT = -1.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ImuReading:
+class ImuReading(NamedTuple):
     """Rate (3,) rad/s and specific force (3,) m/s^2 in body FRD at a stamp.
 
     orientation (4,) w, x, y, z body FRD to NED, None where the message has none.
@@ -53,7 +52,7 @@ def decode_imu(message: Any, params: MessageParams) -> ImuReading:
         message.linear_acceleration, 'linear_acceleration', params.imu.max_acceleration)
     rotation = sensor_to_body(params.imu.mount_rpy, message.header.frame_id)
     orientation = _orientation(message, params.imu)
-    return ImuReading(time_us, rotation @ rate, rotation @ force, orientation)
+    return ImuReading(time_us, rotation.dot(rate), rotation.dot(force), orientation)
 
 
 class ImuIntegrator:
@@ -99,6 +98,8 @@ class ImuIntegrator:
 
 
 def _check_present(covariance: Any, name: str) -> None:
+    if covariance[0] >= 0.0 and covariance[4] >= 0.0 and covariance[8] >= 0.0:
+        return
     if covariance[0] == ABSENT:
         raise Refused(
             f'no_{name}', f'{name}_covariance[0] is -1: the message carries no {name}')

@@ -21,7 +21,7 @@ def decode_magnetic_field(message: Any, params: MessageParams) -> MagSample:
         message.magnetic_field_covariance, (0, 4, 8), 'magnetic_field_covariance')
     tesla = fields.vector(
         message.magnetic_field, 'magnetic_field (in tesla)', params.magnetic_field.max_field)
-    if not tesla.any():
+    if not (tesla[0] or tesla[1] or tesla[2]):
         raise Refused('zero_field', 'magnetic_field is all zero: the sensor does not measure')
     rotation = sensor_to_body(params.magnetic_field.mount_rpy, message.header.frame_id)
-    return MagSample(time_us, GAUSS_PER_TESLA * (rotation @ tesla))
+    return MagSample(time_us, GAUSS_PER_TESLA * rotation.dot(tesla))

@@ -88,10 +88,10 @@ def _position(
         return NAN3, np.full(3, params.unmeasured_variance)
     position = fields.vector(
         message.pose.pose.position, 'pose.pose.position', MAX_POSITION, measured)
+    variance = covariance.diagonal().copy()
     if kind == 'enu':
         position = frames.swap_enu_ned(position)
-        covariance = frames.rotate_covariance(covariance, frames.NED_ENU)
-    variance = covariance.diagonal().copy()
+        variance[:2] = variance[1], variance[0]
     if not measured[2]:
         position[2] = math.nan
         variance[2] = params.unmeasured_variance
@@ -135,7 +135,7 @@ def _velocity(message: Any, params: OdometryMessageParams) -> tuple[Array, Array
         if not measured[axis]:
             covariance[axis, axis] = params.lateral_velocity_noise ** 2
     rotation = sensor_to_body(params.mount_rpy, message.child_frame_id)
-    return rotation @ velocity, frames.rotate_covariance(covariance, rotation)
+    return rotation.dot(velocity), frames.rotate_covariance(covariance, rotation)
 
 
 def _is_blank(twist: Any) -> bool:

@@ -80,12 +80,12 @@ def encode_odometry(nav: NavState, frame_id: str, child_frame_id: str) -> Odomet
     to_earth = matrix_from_quat(nav.quaternion)
     east, north, up = _enu(nav.position)
     w, x, y, z = frames.swap_attitude(nav.quaternion).tolist()
-    forward, right, down = (to_earth.T @ nav.velocity).tolist()
+    forward, right, down = to_earth.T.dot(nav.velocity).tolist()
     p, q, r = nav.angular_rate.tolist()
     twist_covariance = np.zeros((6, 6))
-    body = frames.FRD_FLU @ to_earth.T
-    twist_covariance[:3, :3] = body @ nav.velocity_cov @ body.T
-    twist_covariance[(3, 4, 5), (3, 4, 5)] = RATE_VARIANCE
+    body = frames.FRD_FLU.dot(to_earth.T)
+    twist_covariance[:3, :3] = body.dot(nav.velocity_cov).dot(body.T)
+    twist_covariance.flat[21::7] = RATE_VARIANCE
     return OdometryFields(
         nav.time_us, frame_id, child_frame_id, (east, north, up), (x, y, z, w),
         (forward, -right, -down), (p, -q, -r), pose_covariance_enu(nav.pose_cov),

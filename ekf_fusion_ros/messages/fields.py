@@ -69,7 +69,8 @@ def flat_covariance(covariance: Any, name: str) -> list[float]:
     Raises Refused 'bad_covariance' when there are not 36, 'nan_covariance' for any NaN and
     'negative_covariance' for a negative variance.
     """
-    flat = np.asarray(covariance, dtype=np.float64).ravel().tolist()
+    flat = list(covariance) if isinstance(covariance, tuple) \
+        else np.asarray(covariance, dtype=np.float64).ravel().tolist()
     if len(flat) != 36:
         raise Refused('bad_covariance', f'{name} has {len(flat)} elements, not 36')
     # The sum is NaN with any element, and far quicker than 36 tests.

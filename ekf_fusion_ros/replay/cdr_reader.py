@@ -8,6 +8,7 @@ and other types go to the rosbags library.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 import struct
 from typing import Any
 from typing import NamedTuple
@@ -159,85 +160,89 @@ def reader_of(kind: str) -> Callable[[bytes], Any]:
     return read
 
 
-_HEAD = struct.Struct('<iII').unpack_from
-_DOUBLES: dict[int, Callable[..., tuple[float, ...]]] = {
-    count: struct.Struct(f'<{count}d').unpack_from for count in (2, 6, 12, 37, 42, 85)}
+_LENGTH = struct.Struct('<I').unpack_from
+_FIX = struct.Struct('<12dB').unpack_from
 
 
-def _header(data: bytes) -> tuple[Header, int]:
-    """Return the header and the offset behind it."""
-    sec, nanosec, length = _HEAD(data, ORIGIN)
-    end = ORIGIN + STRING + length
-    return Header(Time(sec, nanosec), _text(data, ORIGIN + STRING, end)), end
+def _length(data: bytes, at: int) -> int:
+    """Return the length of a string that is to lie within the data, its final zero included."""
+    length: int = _LENGTH(data, at)[0]
+    if not 0 < length <= len(data):
+        raise ValueError(f'a string of {length} bytes does not fit')
+    return length
 
 
-def _text(data: bytes, start: int, end: int) -> str:
-    if not start < end <= len(data):
-        raise ValueError(f'a string of {end - start} bytes does not fit')
-    return data[start:end - 1].decode()
+@lru_cache(maxsize=64)
+def _layout(count: int, length: int, second: int = 0) -> Callable[..., tuple[Any, ...]]:
+    """Return the reader of a header, perhaps a second string, and a number of doubles.
+
+    The layout follows from the lengths of the strings, which hardly ever change.
+    """
+    words, end = f'<iII{length}s', STRING + length
+    if second:
+        words += f'{-end % 4}xI{second}s'
+        end += -end % 4 + 4 + second
+    return struct.Struct(f'{words}{-end % 8}x{count}d').unpack_from
 
 
-def _aligned(at: int, size: int) -> int:
-    return at + (ORIGIN - at) % size
+@lru_cache(maxsize=64)
+def _text(data: bytes) -> str:
+    return data[:-1].decode()
 
 
-def _doubles(data: bytes, at: int, count: int) -> tuple[float, ...]:
-    return _DOUBLES[count](data, _aligned(at, 8))
+def _numbers(data: bytes, count: int) -> tuple[Header, tuple[Any, ...]]:
+    """Return the header and what was unpacked: its four words, then the doubles."""
+    v = _layout(count, _length(data, ORIGIN + 8))(data, ORIGIN)
+    return Header(Time(v[0], v[1]), _text(v[3])), v
 
 
 def _imu(data: bytes) -> Imu:
-    header, at = _header(data)
-    v = _doubles(data, at, 37)
-    return Imu(header, Quaternion(*v[0:4]), v[4:13], Vector(*v[13:16]), v[16:25],
-               Vector(*v[25:28]), v[28:37])
+    header, v = _numbers(data, 37)
+    return Imu(header, Quaternion(*v[4:8]), v[8:17], Vector(*v[17:20]), v[20:29],
+               Vector(*v[29:32]), v[32:41])
 
 
 def _magnetic_field(data: bytes) -> MagneticField:
-    header, at = _header(data)
-    v = _doubles(data, at, 12)
-    return MagneticField(header, Vector(*v[0:3]), v[3:12])
+    header, v = _numbers(data, 12)
+    return MagneticField(header, Vector(*v[4:7]), v[7:16])
 
 
 def _fluid_pressure(data: bytes) -> FluidPressure:
-    header, at = _header(data)
-    return FluidPressure(header, *_doubles(data, at, 2))
+    header, v = _numbers(data, 2)
+    return FluidPressure(header, v[4], v[5])
 
 
 def _nav_sat_fix(data: bytes) -> NavSatFix:
-    header, at = _header(data)
-    status, = struct.unpack_from('<b', data, at)
-    at = _aligned(at + 1, 2)
-    service, = struct.unpack_from('<H', data, at)
-    at = _aligned(at + 2, 8)
-    v = _DOUBLES[12](data, at)
-    return NavSatFix(
-        header, NavSatStatus(status, service), v[0], v[1], v[2], v[3:12], data[at + 96])
+    header, v = _numbers(data, 0)
+    at = STRING + len(v[3])
+    status, = struct.unpack_from('<b', data, ORIGIN + at)
+    at += 1 + -(at + 1) % 2
+    service, = struct.unpack_from('<H', data, ORIGIN + at)
+    at += 2 + -(at + 2) % 8
+    v = _FIX(data, ORIGIN + at)
+    return NavSatFix(header, NavSatStatus(status, service), v[0], v[1], v[2], v[3:12], v[12])
 
 
 def _twist_stamped(data: bytes) -> TwistStamped:
-    header, at = _header(data)
-    v = _doubles(data, at, 6)
-    return TwistStamped(header, Twist(Vector(*v[0:3]), Vector(*v[3:6])))
+    header, v = _numbers(data, 6)
+    return TwistStamped(header, Twist(Vector(*v[4:7]), Vector(*v[7:10])))
 
 
 def _twist_with_covariance_stamped(data: bytes) -> TwistStamped:
-    header, at = _header(data)
-    v = _doubles(data, at, 42)
-    twist = Twist(Vector(*v[0:3]), Vector(*v[3:6]))
-    return TwistStamped(header, TwistWithCovariance(twist, v[6:42]))
+    header, v = _numbers(data, 42)
+    twist = Twist(Vector(*v[4:7]), Vector(*v[7:10]))
+    return TwistStamped(header, TwistWithCovariance(twist, v[10:46]))
 
 
 def _odometry(data: bytes) -> Odometry:
-    header, at = _header(data)
-    at = _aligned(at, 4)
-    length, = struct.unpack_from('<I', data, at)
-    end = at + 4 + length
-    child = _text(data, at + 4, end)
-    v = _doubles(data, end, 85)
-    pose = Pose(Vector(*v[0:3]), Quaternion(*v[3:7]))
-    twist = Twist(Vector(*v[43:46]), Vector(*v[46:49]))
-    return Odometry(header, child, PoseWithCovariance(pose, v[7:43]),
-                    TwistWithCovariance(twist, v[49:85]))
+    length = _length(data, ORIGIN + 8)
+    second = _length(data, ORIGIN + STRING + length + -length % 4)
+    v = _layout(85, length, second)(data, ORIGIN)
+    header = Header(Time(v[0], v[1]), _text(v[3]))
+    pose = Pose(Vector(*v[6:9]), Quaternion(*v[9:13]))
+    twist = Twist(Vector(*v[49:52]), Vector(*v[52:55]))
+    return Odometry(header, _text(v[5]), PoseWithCovariance(pose, v[13:49]),
+                    TwistWithCovariance(twist, v[55:91]))
 
 
 READERS: dict[str, Callable[[bytes], Any]] = {

@@ -181,7 +181,7 @@ def _make_folder(options: ReplayOptions) -> None:
 def _bag_steps(
     run: _Run, recording: Recording, choice: Choice,
 ) -> Iterator[list[FusedOutput]]:
-    """Hand the messages to the session, yielding what is due after each."""
+    """Hand the messages to the session, yielding the outputs that are due."""
     session, withholding, options = run.session, run.withholding, run.options
     roles = {topic.name: (role, topic.type, reader_of(topic.type))
              for role, topic in choice.topics.items()}
@@ -203,11 +203,13 @@ def _bag_steps(
         if role in withholding.roles and withholding.holds(role, _stamp_us(message)):
             session.refuse(role, 'withheld')
             continue
-        yield session.handle(role, message)
+        outputs = session.handle(role, message)
+        if outputs:
+            yield outputs
 
 
 def _csv_steps(run: _Run) -> Iterator[list[FusedOutput]]:
-    """Hand the samples of a sensor CSV to the session, yielding what is due after each."""
+    """Hand the samples of a sensor CSV to the session, yielding the outputs that are due."""
     session, options, progress = run.session, run.options, run.progress
     for sample in _with_bar(_samples(options, progress), None, options.progress):
         if not progress.start_us:
@@ -223,7 +225,9 @@ def _csv_steps(run: _Run) -> Iterator[list[FusedOutput]]:
         if run.withholding.holds(role, sample.time_us):
             session.refuse(role, 'withheld')
             continue
-        yield session.push(sample)
+        outputs = session.push(sample)
+        if outputs:
+            yield outputs
 
 
 def _samples(options: ReplayOptions, progress: Progress) -> Iterator[Sample]:
@@ -242,12 +246,10 @@ def _samples(options: ReplayOptions, progress: Progress) -> Iterator[Sample]:
                               f'can be read ({error})')
 
 
-def _with_bar(items: Iterable[Any], total: int | None, shown: bool) -> Iterator[Any]:
-    with tqdm(total=total, disable=None if shown else True, unit=' messages', leave=False) as bar:
-        for number, item in enumerate(items, 1):
-            if number % BAR_STEP == 0:
-                bar.update(BAR_STEP)
-            yield item
+def _with_bar(items: Iterable[Any], total: int | None, shown: bool) -> Iterable[Any]:
+    bar = tqdm(items, total=total, disable=None if shown else True, unit=' messages', leave=False,
+               miniters=BAR_STEP)
+    return items if bar.disable else bar
 
 
 def _stamp_us(message: Any) -> int:
