@@ -32,7 +32,13 @@ VERTICAL_NOISE_RATIO = 1.5
 DATA_TIMEOUT_US = 10 * SECOND
 DATA_TIMEOUT_AIDED_US = 1 * SECOND
 INTERMITTENT_US = 1 * SECOND
-NIS_DECAY = 0.95
+NIS_SHARE = 0.4
+"""Share of one fix in the mean of the normalised innovations: about four fixes count."""
+
+NIS_PLAUSIBLE = 2.0
+"""Mean over four fixes of three components that chance exceeds one time in fifty."""
+
+NIS_DECAY = 0.97
 """Factor per fix by which raised accelerometer variance falls back."""
 
 
@@ -51,6 +57,7 @@ class Gnss:
         self.intermittent = True
         self.vision_yaw_forbidden = False
         self._previous_fix_us = 0
+        self._velocity_nis = 1.0
         self._has_aided = False
 
     @property
@@ -296,9 +303,9 @@ class Gnss:
         """Let the accelerometer noise follow the innovations of the velocity.
 
         Innovation-based adaptive estimation (R. K. Mehra, "Approaches to adaptive filtering",
-        1972): in a consistent filter the normalised innovation squared is 1 in the mean. More of
-        it tells that the inertial data are worse than stated (vibration, lag, stamps): the noise
-        rises at once and falls back slowly.
+        1972): in a consistent filter the normalised innovation squared is 1 in the mean. Much more
+        of it over the last fixes tells that the inertial data are worse than stated (vibration,
+        lag, stamps): the noise rises at once and falls back slowly.
         """
         f = self._f
         if not f.params.imu.adapt_accel_noise:
@@ -307,8 +314,9 @@ class Gnss:
         squares = [
             i * i / v for record in (seen.gps_hor_vel, seen.gps_ver_vel)
             for i, v in zip(record.innovation, record.variance, strict=True)]
-        excess = sum(squares) / len(squares)
-        f.cov.scale_accel_noise(excess if excess > 1.0 else NIS_DECAY)
+        self._velocity_nis += NIS_SHARE * (sum(squares) / len(squares) - self._velocity_nis)
+        implausible = self._velocity_nis > NIS_PLAUSIBLE
+        f.cov.scale_accel_noise(self._velocity_nis if implausible else NIS_DECAY)
 
     def _position_sigma(self, hacc: float) -> float:
         """Bound the claimed accuracy; a sole source may not be distrusted without limit."""
