@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 import math
 from typing import Protocol
 
@@ -25,10 +26,12 @@ class Projection(Protocol):
         """Return (latitude, longitude) in deg, longitude in [-180, 180)."""
 
 
+@lru_cache(maxsize=8)
 def make_projection(name: str, lat: float, lon: float, alt: float = 0.0) -> Projection:
     """Return the projection called `name` ('wgs84' or 'sphere') about an origin (deg, m).
 
-    `alt` counts on the ellipsoid only. Raises ValueError on an unknown name or a bad origin.
+    The projections of the last origins are kept: asking again is cheap. `alt` counts on the
+    ellipsoid only. Raises ValueError on an unknown name or a bad origin.
     """
     if name == 'wgs84':
         return Wgs84Projection(lat, lon, alt)

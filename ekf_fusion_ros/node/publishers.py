@@ -8,9 +8,7 @@ from rclpy.node import Node
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import NavSatFix
 
-from ekf_fusion_ros.estimator import GeoPoint
 from ekf_fusion_ros.fused_output import FusedOutput
-from ekf_fusion_ros.geo.projection import Projection
 from ekf_fusion_ros.geo.projection import make_projection
 from ekf_fusion_ros.messages.encode import NavSatFixFields
 from ekf_fusion_ros.messages.encode import OdometryFields
@@ -34,8 +32,6 @@ class Publishers:
             Odometry, 'odometry/gps', output_qos(), qos_overriding_options=overridable)
         self._fix = node.create_publisher(
             NavSatFix, 'gps/filtered', output_qos(), qos_overriding_options=overridable)
-        self._origin: GeoPoint | None = None
-        self._projection: Projection | None = None
 
     def publish(self, output: FusedOutput) -> None:
         """Publish one output and the fixes that came with it.
@@ -49,18 +45,12 @@ class Publishers:
         origin = output.nav.origin
         if output.local or origin is None:
             return
-        projection = self._projection_about(origin)
+        projection = make_projection(
+            self._params.ekf2.earth.projection, origin.lat, origin.lon, origin.alt)
         self._fix.publish(fix_message(encode_fix(output.nav, projection, body)))
         for fix in output.fixes:
             self._gps.publish(
                 odometry_message(encode_gnss_odometry(fix, origin, projection, world)))
-
-    def _projection_about(self, origin: GeoPoint) -> Projection:
-        if self._projection is None or origin != self._origin:
-            self._origin = origin
-            self._projection = make_projection(
-                self._params.ekf2.earth.projection, origin.lat, origin.lon, origin.alt)
-        return self._projection
 
 
 def odometry_message(fields: OdometryFields) -> Odometry:

@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from dataclasses import field
 from dataclasses import replace
 from functools import cache
+import gc
+from itertools import chain
+from itertools import islice
 import sys
 from threading import Timer
 import time
@@ -21,6 +24,7 @@ from tqdm import tqdm
 from ekf_fusion_ros.estimator import Event
 from ekf_fusion_ros.fused_output import FusedOutput
 from ekf_fusion_ros.inputs import ROLE_OF_SAMPLE
+from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.messages.stamps import microseconds
 from ekf_fusion_ros.params import Params
 from ekf_fusion_ros.replay.cdr_reader import reader_of
@@ -41,7 +45,8 @@ from ekf_fusion_ros.session import FusionSession
 from ekf_fusion_ros.warm_up import warm_up
 
 CSV_SUFFIXES = ('.csv', '.csv.gz')
-BAR_STEP = 200
+# Reading, filtering and writing take turns: a processor repeats a task faster than it switches.
+BATCH = 256
 COMPILE_NOTICE_AFTER = 3.0
 COMPILE_NOTICE = 'compiling the numeric kernels: a minute or so, once; the result is cached'
 Say = Callable[[str], None]
@@ -86,6 +91,8 @@ def make_kernels_ready() -> None:
         warm_up(Params())
     finally:
         notice.cancel()
+    # What is loaded by now stays; each full collection would walk all of numba again.
+    gc.freeze()
 
 
 def _replay_bag(options: ReplayOptions, say: Say) -> dict[str, Any]:
@@ -136,6 +143,7 @@ class _Run:
         self._alignment = AlignmentSink(options.output)
         self._bag = BagSink(options.output, options.params, local=self.session.local) \
             if options.write_bag else None
+        self._rows: list[FusedOutput] = []
         self.withholding = Withholding(options.withhold, progress.start_us)
 
     def drive(self, steps: Iterable[list[FusedOutput]]) -> None:
@@ -145,6 +153,7 @@ class _Run:
             for sink in (self._track, self._alignment, self._bag, self._states):
                 if sink is not None:
                     stack.callback(sink.close)
+            stack.callback(self._flush)
             for outputs in steps:
                 for output in outputs:
                     self._write(output)
@@ -157,10 +166,19 @@ class _Run:
     def _write(self, output: FusedOutput) -> None:
         if self.progress.first_output_us is None:
             self.progress.first_output_us = output.time_us
-        self._track.write(output)
         self._alignment.write(output, self.session)
+        self._rows.append(output)
+        if len(self._rows) >= BATCH:
+            self._flush()
+
+    def _flush(self) -> None:
+        """Write the rows that have gathered."""
+        rows, self._rows = self._rows, []
+        for output in rows:
+            self._track.write(output)
         if self._bag is not None:
-            self._bag.write(output)
+            for output in rows:
+                self._bag.write(output)
 
     def finish(self, choice: Choice, say: Say) -> dict[str, Any]:
         """Write summary.json and say the gist of it."""
@@ -183,22 +201,12 @@ def _bag_steps(
 ) -> Iterator[list[FusedOutput]]:
     """Hand the messages to the session, yielding the outputs that are due."""
     session, withholding, options = run.session, run.withholding, run.options
-    roles = {topic.name: (role, topic.type, reader_of(topic.type))
-             for role, topic in choice.topics.items()}
-    first_ns = recording.start_ns + round(1e9 * options.start)
     last_ns = None if options.end is None else recording.start_ns + round(1e9 * options.end)
-    total = sum(topic.count for topic in choice.topics.values())
-    for time_ns, name, data in _with_bar(recording.messages(roles), total, options.progress):
-        if time_ns < first_ns:
-            continue
+    for time_ns, role, message in _bag_messages(recording, choice, options):
         if last_ns is not None and time_ns >= last_ns:
             break
-        role, kind, read = roles[name]
-        try:
-            message = read(data)
-        except Exception as error:
-            # Damaged bytes can make the decoder raise anything.
-            session.refuse(role, 'undecodable', f'{len(data)} bytes are no {kind} ({error})')
+        if isinstance(message, Refused):
+            session.refuse(role, message.reason, message.detail)
             continue
         if role in withholding.roles and withholding.holds(role, _stamp_us(message)):
             session.refuse(role, 'withheld')
@@ -208,10 +216,34 @@ def _bag_steps(
             yield outputs
 
 
+def _bag_messages(
+    recording: Recording, choice: Choice, options: ReplayOptions,
+) -> Iterator[tuple[int, str, Any]]:
+    """Yield log time in ns, role and message, or why its bytes are none."""
+    roles = {topic.name: (role, topic.type, reader_of(topic.type))
+             for role, topic in choice.topics.items()}
+    first_ns = recording.start_ns + round(1e9 * options.start)
+    total = sum(topic.count for topic in choice.topics.values())
+    for batch in _batches(recording.messages(roles), total, options.progress):
+        for time_ns, name, data in batch:
+            if time_ns >= first_ns:
+                role, kind, read = roles[name]
+                yield time_ns, role, _decoded(data, kind, read)
+
+
+def _decoded(data: bytes, kind: str, read: Callable[[bytes], Any]) -> Any:
+    try:
+        return read(data)
+    except Exception as error:
+        # Damaged bytes can make the decoder raise anything.
+        return Refused('undecodable', f'{len(data)} bytes are no {kind} ({error})')
+
+
 def _csv_steps(run: _Run) -> Iterator[list[FusedOutput]]:
     """Hand the samples of a sensor CSV to the session, yielding the outputs that are due."""
     session, options, progress = run.session, run.options, run.progress
-    for sample in _with_bar(_samples(options, progress), None, options.progress):
+    batches = _batches(_samples(options, progress), None, options.progress)
+    for sample in chain.from_iterable(batches):
         if not progress.start_us:
             progress.start_us = sample.time_us
             run.withholding = Withholding(options.withhold, sample.time_us)
@@ -246,10 +278,12 @@ def _samples(options: ReplayOptions, progress: Progress) -> Iterator[Sample]:
                               f'can be read ({error})')
 
 
-def _with_bar(items: Iterable[Any], total: int | None, shown: bool) -> Iterable[Any]:
-    bar = tqdm(items, total=total, disable=None if shown else True, unit=' messages', leave=False,
-               miniters=BAR_STEP)
-    return items if bar.disable else bar
+def _batches(items: Iterator[Any], total: int | None, shown: bool) -> Iterator[list[Any]]:
+    """Yield the items in batches, under a progress bar."""
+    with tqdm(total=total, disable=None if shown else True, unit=' messages', leave=False) as bar:
+        while batch := list(islice(items, BATCH)):
+            yield batch
+            bar.update(len(batch))
 
 
 def _stamp_us(message: Any) -> int:

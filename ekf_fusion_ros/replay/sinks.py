@@ -13,9 +13,7 @@ from rosbags.rosbag2 import Writer
 from rosbags.typesys import Stores
 from rosbags.typesys import get_typestore
 
-from ekf_fusion_ros.estimator import GeoPoint
 from ekf_fusion_ros.fused_output import FusedOutput
-from ekf_fusion_ros.geo.projection import Projection
 from ekf_fusion_ros.geo.projection import make_projection
 from ekf_fusion_ros.messages.encode import encode_fix
 from ekf_fusion_ros.messages.encode import encode_gnss_odometry
@@ -105,7 +103,6 @@ class BagSink:
     def __init__(self, folder: Path, params: Params, *, local: bool) -> None:
         self._frames = params.node.output_frame, params.node.base_link_frame
         self._projection_name = params.ekf2.earth.projection
-        self._projection: tuple[GeoPoint, Projection] | None = None
         path = folder / 'fused'
         if path.exists():
             shutil.rmtree(path)
@@ -125,21 +122,17 @@ class BagSink:
         self._put('/odometry/filtered', time_us, odometry_cdr(encode_odometry(nav, *self._frames)))
         if output.local or nav.origin is None:
             return
-        projection = self._projection_about(nav.origin)
+        origin = nav.origin
+        projection = make_projection(
+            self._projection_name, origin.lat, origin.lon, origin.alt)
         fix = encode_fix(nav, projection, self._frames[1])
         self._put('/gps/filtered', time_us, fix_cdr(fix))
         for sample in output.fixes:
-            fields = encode_gnss_odometry(sample, nav.origin, projection, self._frames[0])
+            fields = encode_gnss_odometry(sample, origin, projection, self._frames[0])
             self._put('/odometry/gps', time_us, odometry_cdr(fields))
 
     def _put(self, topic: str, time_us: int, data: bytes) -> None:
         self._writer.write(self._connections[topic], time_us * 1000, data)
-
-    def _projection_about(self, origin: GeoPoint) -> Projection:
-        if self._projection is None or self._projection[0] != origin:
-            made = make_projection(self._projection_name, origin.lat, origin.lon, origin.alt)
-            self._projection = origin, made
-        return self._projection[1]
 
     def close(self) -> None:
         """Finish the bag."""
