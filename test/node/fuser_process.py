@@ -20,7 +20,7 @@ from rclpy.qos import QoSProfile
 from sensor_msgs.msg import NavSatFix
 
 DEADLINE_S = 120.0
-RELIABLE = QoSProfile(depth=1000)
+RELIABLE = QoSProfile(depth=10000)
 REPOSITORY = Path(__file__).resolve().parents[2]
 
 

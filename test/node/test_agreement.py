@@ -54,7 +54,7 @@ INPUTS = {
     'pressure': ('pressure', FluidPressure),
 }
 IN_FLIGHT = 300
-DEPTH = 2000
+DEPTH = 10000
 
 
 @dataclass(frozen=True)
@@ -120,6 +120,9 @@ def rows_of_node(
     for role, topic in play.topics.items():
         parameters[f'node.use_{role}'] = True
         parameters[f'qos_overrides.{topic}.subscription.depth'] = DEPTH
+    # One odometry message can make ten rows: a reliable writer keeps no more than its depth.
+    for output in ('/odometry/filtered', '/odometry/gps', '/gps/filtered'):
+        parameters[f'qos_overrides.{output}.publisher.depth'] = DEPTH
     parameters['node.use_odometry'] = 'odometry' in play.topics
     names = {INPUTS[role][0]: topic for role, topic in play.topics.items()}
     fuser = start_fuser(parameters, names)
