@@ -11,9 +11,12 @@ from rclpy.qos import HistoryPolicy
 from rclpy.qos import QoSProfile
 from rclpy.qos import ReliabilityPolicy
 
-SENSOR_DEPTH = 10
-IMU_DEPTH = 100
-OUTPUT_DEPTH = 10
+SENSOR_DEPTH = 200
+IMU_DEPTH = 1000
+"""Deep enough for seconds of a busy machine: a message that DDS overwrites is lost unnoticed."""
+
+OUTPUT_DEPTH = 100
+"""One odometry message can make ten rows at once."""
 
 
 def input_qos(role: str) -> QoSProfile:
