@@ -84,7 +84,7 @@ class InertialInput:
     def push(self, reading: Any) -> list[ImuSample]:
         """Return the increments that end with this reading."""
         if self._imu is not None:
-            sample = self._imu.push(reading)
+            sample = reading if isinstance(reading, ImuSample) else self._imu.push(reading)
             return [] if sample is None else [sample]
         assert self._odometry is not None
         samples: list[ImuSample] = self._odometry.push(reading)

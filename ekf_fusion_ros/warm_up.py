@@ -30,7 +30,9 @@ if TYPE_CHECKING:
 
 STEP_US = 10_000
 STEPS = 1800
-SPEED = 3.0
+STEADY_S = 6.0
+CLIMB = 3.0
+ACCELERATION = 1.5
 METRES_PER_DEGREE = 111_195.0
 UP = np.array([0.0, 0.0, -1.0])
 NORTH = np.array([1.0, 0.0, 0.0])
@@ -59,21 +61,29 @@ def warm_up(params: Params, stopped: Callable[[], bool] = lambda: False) -> None
 
 
 def climb() -> Iterator[Sample]:
-    """Yield the samples of a steady climb to the north: every sensor, inertial ones last."""
-    yield LandedSample(STEP_US, landed=False)
+    """Yield the samples of a climb with every sensor, inertial ones last.
+
+    It is steady at first, for the alignment, and then gains speed to the north: acceleration
+    lets the filter take the magnetometer on three axes.
+    """
     for number in range(1, STEPS):
         time_us = number * STEP_US
-        way = SPEED * time_us * 1e-6
+        run_up = max(0.0, time_us * 1e-6 - STEADY_S)
+        if time_us == round(1e6 * STEADY_S):
+            yield LandedSample(time_us, landed=False)
+        place = CLIMB * time_us * 1e-6 * UP + 0.5 * ACCELERATION * run_up ** 2 * NORTH
+        velocity = CLIMB * UP + ACCELERATION * run_up * NORTH
         if number % 5 == 0:
             yield MagSample(time_us, FIELD)
-            yield BaroSample(time_us, 100.0 + way)
+            yield BaroSample(time_us, 100.0 - place[2])
         if number % 4 == 0:
-            yield VisionSample(time_us, way * (NORTH + UP), LEVEL, SPEED * (NORTH + UP))
+            yield VisionSample(time_us, place, LEVEL, velocity)
         if number % 20 == 0:
             yield GnssSample(
-                time_us, 47.0 + way / METRES_PER_DEGREE, 8.0, 100.0 + way, 0.5, 0.8,
-                SPEED * (NORTH + UP), 0.2)
+                time_us, 47.0 + place[0] / METRES_PER_DEGREE, 8.0, 100.0 - place[2], 0.5, 0.8,
+                velocity, 0.2)
         if number % 600 == 0:
             yield HeadingSample(time_us, 0.0, math.radians(3.0) ** 2)
         dt = STEP_US * 1e-6
-        yield ImuSample(time_us, np.zeros(3), 9.80665 * dt * UP, dt, dt)
+        force = 9.80665 * UP + (ACCELERATION * NORTH if run_up else 0.0)
+        yield ImuSample(time_us, np.zeros(3), dt * force, dt, dt)

@@ -40,6 +40,8 @@ from ekf_fusion_ros.replay.topics import ALL_TYPES
 from ekf_fusion_ros.replay.topics import Choice
 from ekf_fusion_ros.replay.topics import choose
 from ekf_fusion_ros.replay.withholding import Withholding
+from ekf_fusion_ros.roles import SUPPORTED
+from ekf_fusion_ros.roles import configure
 from ekf_fusion_ros.samples import Sample
 from ekf_fusion_ros.session import FusionSession
 from ekf_fusion_ros.warm_up import warm_up
@@ -62,6 +64,7 @@ class Progress:
     rows: int = 0
     events: list[Event] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    kernel_seconds: float = 0.0
     cpu_seconds: float = 0.0
     wall_seconds: float = 0.0
 
@@ -75,10 +78,12 @@ def replay(options: ReplayOptions, say: Say = print) -> dict[str, Any]:
     """
     if not options.recording.exists():
         raise RecordingError(f'{options.recording}: does not exist')
+    begin = time.process_time()
     make_kernels_ready()
+    progress = Progress(kernel_seconds=time.process_time() - begin)
     if options.recording.name.endswith(CSV_SUFFIXES):
-        return _replay_csv(options, say)
-    return _replay_bag(options, say)
+        return _replay_csv(options, progress, say)
+    return _replay_bag(options, progress, say)
 
 
 @cache
@@ -88,21 +93,22 @@ def make_kernels_ready() -> None:
     notice.daemon = True
     notice.start()
     try:
-        warm_up(Params())
+        warm_up(configure(Params(), SUPPORTED))
     finally:
         notice.cancel()
     # What is loaded by now stays; each full collection would walk all of numba again.
     gc.freeze()
 
 
-def _replay_bag(options: ReplayOptions, say: Say) -> dict[str, Any]:
+def _replay_bag(options: ReplayOptions, progress: Progress, say: Say) -> dict[str, Any]:
     with Recording(options.recording, ALL_TYPES) as recording:
         choice = choose(recording.topics, options.topics, str(options.recording))
         told = list(recording.notes)
         for line in [*told, *choice.lines()]:
             say(line)
         params = _with_roles(options.params, choice)
-        progress = Progress(recording.start_ns // 1000, recording.end_ns // 1000)
+        progress.start_us = recording.start_ns // 1000
+        progress.end_us = recording.end_ns // 1000
         run = _Run(replace(options, params=params), list(choice.topics), progress)
         run.drive(_bag_steps(run, recording, choice))
         progress.notes = recording.notes
@@ -111,10 +117,9 @@ def _replay_bag(options: ReplayOptions, say: Say) -> dict[str, Any]:
         return run.finish(choice, say)
 
 
-def _replay_csv(options: ReplayOptions, say: Say) -> dict[str, Any]:
+def _replay_csv(options: ReplayOptions, progress: Progress, say: Say) -> dict[str, Any]:
     if options.topics:
         raise RecordingError(f'{options.recording}: a sensor CSV has no topics: leave --topic out')
-    progress = Progress()
     run = _Run(options, None, progress)
     run.drive(_csv_steps(run))
     for note in progress.notes:

@@ -52,6 +52,7 @@ def _content(
         'rows': progress.rows,
         'notes': progress.notes,
         'cpu_seconds': progress.cpu_seconds,
+        'kernel_loading_cpu_seconds': progress.kernel_seconds,
         'real_time_factor': duration / max(progress.wall_seconds, 1e-9),
         'versions': _versions(),
     }
@@ -114,8 +115,13 @@ def _gist(summary: dict[str, Any]) -> list[str]:
     speed = summary['real_time_factor']
     if math.isfinite(speed):
         lines.append(f'{summary["duration"]:.1f} s in {summary["cpu_seconds"]:.1f} s of CPU, '
-                     f'{speed:.0f} times real time')
+                     f'{speed:.0f} times real time' + _loading(summary))
     return lines
+
+
+def _loading(summary: dict[str, Any]) -> str:
+    seconds = summary['kernel_loading_cpu_seconds']
+    return f'; before it {seconds:.1f} s to load the kernels' if seconds >= 0.05 else ''
 
 
 def _missing(summary: dict[str, Any]) -> str:

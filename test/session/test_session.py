@@ -290,6 +290,16 @@ def test_samples_go_straight_in_without_roles(estimator):
     assert session.local
 
 
+def test_increments_of_a_caller_are_taken_as_they_are(estimator):
+    session = session_of(estimator, 'imu', 'fix')
+    pushed = [ImuSample(1_000_000 + 4000 * n, np.zeros(3), np.array([0.0, 0.0, -0.04]), 0.004,
+                        0.004) for n in range(1, 4)]
+    for sample in pushed:
+        session.push(sample)
+    assert estimator.samples == pushed
+    assert session.statistics()['imu'].accepted == 3
+
+
 def test_health_says_what_it_waits_for(build, estimator):
     session = session_of(estimator, 'imu', 'fix')
     assert 'waiting for imu' in session.health().text
