@@ -12,6 +12,8 @@ from ekf_fusion_ros.ekf2.covariance import quat_by_rotation_vector
 from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import HealthLevel
 from ekf_fusion_ros.estimator import NavState
+from ekf_fusion_ros.kernels.compile import kernel
+from ekf_fusion_ros.params.ekf2 import ZERO
 
 if TYPE_CHECKING:
     from ekf_fusion_ros.ekf2.ekf2 import Ekf2
@@ -19,18 +21,27 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+@kernel
 def attitude_error_jacobian(q: Array) -> Array:
     """Return d(small earth-frame rotation)/d(quaternion), (3, 4): 2 [-v, w I - [v x]]."""
-    w, x, y, z = q
-    return 2.0 * np.array(((-x, w, -z, y), (-y, z, w, -x), (-z, -y, x, w)))
+    w, x, y, z = 2.0 * q[0], 2.0 * q[1], 2.0 * q[2], 2.0 * q[3]
+    jacobian = np.empty((3, 4))
+    jacobian[0, 0], jacobian[0, 1], jacobian[0, 2], jacobian[0, 3] = -x, w, -z, y
+    jacobian[1, 0], jacobian[1, 1], jacobian[1, 2], jacobian[1, 3] = -y, z, w, -x
+    jacobian[2, 0], jacobian[2, 1], jacobian[2, 2], jacobian[2, 3] = -z, -y, x, w
+    return jacobian
 
 
+@kernel
 def pose_covariance(q: Array, p: Array) -> Array:
     """Return (6, 6): position NED, then small rotations about the earth axes."""
-    jacobian = np.zeros((6, 24))
-    jacobian[0:3, 7:10] = np.eye(3)
-    jacobian[3:6, 0:4] = attitude_error_jacobian(q)
-    covariance: Array = jacobian @ p @ jacobian.T
+    jacobian = attitude_error_jacobian(q)
+    covariance = np.empty((6, 6))
+    covariance[0:3, 0:3] = p[7:10, 7:10]
+    turned = np.dot(jacobian, np.ascontiguousarray(p[0:4, 0:10]))
+    covariance[3:6, 0:3] = turned[:, 7:10]
+    covariance[0:3, 3:6] = turned[:, 7:10].T
+    covariance[3:6, 3:6] = np.dot(np.ascontiguousarray(turned[:, 0:4]), jacobian.T)
     return covariance
 
 
@@ -39,15 +50,18 @@ def nav_state(ekf: Ekf2) -> NavState:
     f = ekf.filter
     out = f.output
     q = out.now[0:4].copy()
-    lever = np.asarray(ekf.params.imu.position)
+    velocity, position = out.now[4:7].copy(), out.now[7:10].copy()
+    if ekf.params.imu.position != ZERO:
+        lever = np.asarray(ekf.params.imu.position)
+        velocity, position = out.velocity_at_origin(lever), out.position_at_origin(lever)
     p = f.cov.p
     validity = ekf.control.validity
     gyro_bias = f.x[10:13] / f.dt_avg
     return NavState(
         time_us=f.t_now,
         quaternion=q,
-        velocity=out.velocity_at_origin(lever),
-        position=out.position_at_origin(lever),
+        velocity=velocity,
+        position=position,
         angular_rate=out.rate - gyro_bias,
         pose_cov=pose_covariance(f.x[0:4], p),
         velocity_cov=p[4:7, 4:7].copy(),
