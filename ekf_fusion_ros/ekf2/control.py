@@ -89,6 +89,7 @@ class Control:
             return False
         shift = float(self._f.x[PD]) - before
         self.baro.offset += shift
+        self.height.move(shift)
         self.terrain.move(shift)
         return True
 
@@ -101,8 +102,10 @@ class Control:
 
     def _check_arrivals(self) -> None:
         """Judge whether sensors still deliver, before the horizon takes their samples."""
-        newest = self.gnss.buffer.newest_time_us
-        self.gnss.intermittent = not self._f.recent(newest, INTERMITTENT_US)
+        fixes = self.gnss.buffer
+        has_height = fixes.newest is not None and math.isfinite(fixes.newest.altitude)
+        self.gnss.height_intermittent = not (
+            has_height and self._f.recent(fixes.newest_time_us, INTERMITTENT_US))
         self.baro.check_arrival()
 
     def _step_bank(self, gnss_popped: bool) -> None:

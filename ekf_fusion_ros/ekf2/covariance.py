@@ -25,6 +25,12 @@ NO_CLIPPING = (False, False, False)
 BAD_ACCEL_NOISE = 4.9
 """Accelerometer noise in m/s^2 while it clips or contradicts the height aiding."""
 
+HEIGHT_RATE_TIME = 10.0
+"""Time constant in s of the height rate by which the wind changes faster."""
+
+WIND_NOISE_BY_HEIGHT_RATE = 0.5
+"""Relative growth of the wind noise per m/s of height rate: wind shears with height."""
+
 DRIFT_SPEED = 1.0
 """Speed in m/s above which the position drift of dead reckoning grows no more."""
 
@@ -55,18 +61,18 @@ class Covariance:
         self._noise[13:16] = (dt * dt * imu.accel_bias_process_noise) ** 2
         self._noise[16:19] = (dt * mag.earth_process_noise) ** 2
         self._noise[19:22] = (dt * mag.body_process_noise) ** 2
+        self._height_rate = 0.0
         self._wind_noise = dt * params.aiding.wind_process_noise
         self._position_drift_var = dt * params.aiding.position_drift ** 2
         self._yaw_drift_var = dt * params.aiding.yaw_drift ** 2
 
     def predict(
         self, x: Array, imu: Array, dt_avg: float, bad_accel: bool,
-        clipping: tuple[bool, bool, bool], climb_rate: float,
+        clipping: tuple[bool, bool, bool],
     ) -> None:
         """Propagate P over one filter period of nominal length.
 
-        imu (8,) raw increments; dt_avg mean filter period in s; climb_rate m/s scales the wind
-        noise.
+        x (24,) the predicted state; imu (8,) raw increments; dt_avg mean filter period in s.
         """
         self._accel_bias_var_max = (0.1 * GRAVITY * dt_avg) ** 2
         velocity_var = self._accel_var
@@ -75,8 +81,10 @@ class Covariance:
         elif clipping != NO_CLIPPING:
             velocity_var = np.where(clipping, self._bad_accel_var, self._accel_var)
         noise = self._noise
+        self._height_rate += FILTER_PERIOD / HEIGHT_RATE_TIME * (float(x[6]) - self._height_rate)
         if self.wind_active:
-            noise[22:24] = (self._wind_noise * (1.0 + 0.5 * abs(climb_rate))) ** 2
+            growth = 1.0 + WIND_NOISE_BY_HEIGHT_RATE * abs(self._height_rate)
+            noise[22:24] = (self._wind_noise * growth) ** 2
         predict_covariance(self.p, self._transition, x, imu, self._angle_var, velocity_var, noise,
                            self.inhibited, self._saved, self.mag_active, self.wind_active)
         if self._position_drift_var > 0.0:
@@ -182,17 +190,6 @@ class Covariance:
         self.set_variances(16, np.full(6, variance))
         if not self.mag_active:
             self._save_field()
-
-    def clear_field(self) -> None:
-        """Zero the field block of P."""
-        self.p[16:22, :] = 0.0
-        self.p[:, 16:22] = 0.0
-
-    def set_wind(self, block: Array) -> None:
-        """Give the wind states a covariance (2, 2) and no correlation."""
-        self.p[22:24, :] = 0.0
-        self.p[:, 22:24] = 0.0
-        self.p[22:24, 22:24] = block
 
     def _save_field(self) -> None:
         self._saved_ne = self.p[16:18, 16:18].copy()

@@ -73,7 +73,7 @@ class Ekf2:
         """Queue a measurement; those before the first ImuSample have no effect."""
         if isinstance(sample, ImuSample):
             self._push_imu(sample)
-        elif not self.inertial.last_us:
+        elif not self.inertial.started:
             return
         elif isinstance(sample, MagSample):
             self.control.mag.push(sample, self.inertial.min_interval_us)
@@ -97,7 +97,6 @@ class Ekf2:
             return False
         complete = self._period_complete
         if complete:
-            self._period_complete = False
             self._predict()
             self._ground_contact.step(self.inertial.quiet)
             self.control.step()
@@ -113,8 +112,8 @@ class Ekf2:
             self.update()
         f = self.filter
         self._raw = sample
-        if self.inertial.add(sample, f.flags.in_air):
-            self._period_complete = True
+        self._period_complete = self.inertial.add(sample, f.flags.in_air)
+        if self._period_complete:
             f.t_horizon = self.inertial.ring[0].time_us
         f.flags.vehicle_at_rest = self.inertial.at_rest
         f.t_now = sample.time_us
@@ -133,7 +132,7 @@ class Ekf2:
         f = self.filter
         self.control.terrain.initialise()
         times = f.times
-        times.hgt = times.hor_pos = times.del_pos = times.hor_vel = times.flow = f.t_now
+        times.hgt = times.hor_pos = times.hor_vel = times.flow = f.t_now
         f.output.align(f.x)
         self.initialised = True
         return True
@@ -148,7 +147,7 @@ class Ekf2:
             self.params.imu.accel_bias_limit, self._learning.peaks, self._learning.decay)
         self._learning.step()
         f.cov.wind_active = f.flags.wind
-        f.cov.predict(f.x, increments, f.dt_avg, f.faults.accel_vertical, f.imu.clipping, 0.0)
+        f.cov.predict(f.x, increments, f.dt_avg, f.faults.accel_vertical, f.imu.clipping)
         self._learning.check_consistency()
 
     def nav_state(self) -> NavState | None:

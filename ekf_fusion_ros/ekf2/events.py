@@ -37,7 +37,6 @@ class EventKind(Enum):
     YAW_ALIGNED_MOTION = 'yaw aligned by matching odometry and GNSS displacements'
     TILT_ALIGNED = 'tilt aligned'
     YAW_ALIGNED = 'yaw aligned'
-    VISION_JUMP = 'odometry frame jumped, re-anchored'
 
 
 class EventLog:

@@ -125,7 +125,6 @@ class Filter:
         self.rot_ev: Array = np.eye(3)
         self.last_velocity = np.zeros(2)
         self.last_velocity_variance = np.zeros(2)
-        self.position_is_relative = False
         self.holding_position = False
         self.dead_reckoning = True
         self.last_aiding_us = 0

@@ -118,7 +118,6 @@ class FusionTimes:
     hor_vel: int = 0
     ver_vel: int = 0
     hor_pos: int = 0
-    del_pos: int = 0
     hgt: int = 0
     flow: int = 0
     flow_terrain: int = 0

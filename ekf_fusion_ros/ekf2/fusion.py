@@ -25,15 +25,6 @@ def test_ratio(innovation: float, variance: float, gate: float) -> float:
     return innovation * innovation / (gate * gate * variance)
 
 
-def fuse_scalar(
-    f: Filter, fault: str, gain: Array, hp: Array, innovation: float,
-) -> bool:
-    """Fuse with a gain (24,) and H P (24,), and note a numerical fault under its name."""
-    healthy = f.cov.fuse(f.x, gain, hp, innovation)
-    setattr(f.faults, fault, not healthy)
-    return healthy
-
-
 def _fuse_pair(
     f: Filter, first: int, faults: tuple[str, str], innovation: Sequence[float],
     variance: Sequence[float],
@@ -73,12 +64,11 @@ def fuse_horizontal_velocity(
 
 def fuse_horizontal_position(
     f: Filter, record: Observation, innovation: Sequence[float], noise: Sequence[float],
-    gate: float, *, relative: bool = False, enforce_up_to: float = 1.0,
+    gate: float, *, enforce_up_to: float = 1.0,
 ) -> bool:
     """Gate and fuse NE position; innovation in m, noise variances in m^2.
 
-    A relative position keeps a clock of its own: it bounds drift, not position. A test ratio above
-    `enforce_up_to` is rejected.
+    A test ratio above `enforce_up_to` is rejected.
     """
     _judge_pair(f, record, PN, innovation, noise, gate)
     if record.test_ratio > enforce_up_to:
@@ -87,10 +77,7 @@ def fuse_horizontal_position(
         return False
     record.accept()
     f.rejections.hor_pos = False
-    if relative:
-        f.times.del_pos = f.t_now
-    else:
-        f.times.hor_pos = f.t_now
+    f.times.hor_pos = f.t_now
     _fuse_pair(f, PN, ('pos_n', 'pos_e'), record.innovation, record.variance)
     return True
 

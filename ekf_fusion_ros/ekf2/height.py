@@ -24,6 +24,12 @@ RATIO_LIMIT = 3.0
 CLIP_COUNT_MAX = 100
 VISION_RECENT_US = 400_000
 NO_HEIGHT_NOISE = 10.0
+HOLD_INTERVAL_US = 200_000
+HOLD_GATE = 300.0
+"""Wide enough to pull back a height that has run away."""
+
+KNOWN_CLIMB_VARIANCE = 0.25
+"""Variance in (m/s)^2 of the climb rate below which height is dead reckoned, not held."""
 
 
 class Height:
@@ -42,7 +48,7 @@ class Height:
         self._clips = 0
         self._time_bad_us = 0
         self._time_good_us = 0
-        self._last_fix_us = 0
+        self._last_known_down = 0.0
 
     # ---- health ----
 
@@ -110,7 +116,7 @@ class Height:
         accel_is_good = self._f.late(self._time_bad_us, BAD_ACCEL_PROBATION_US)
         accurate = newest is not None and newest.vacc < self._f.params.gnss.checks.req_vacc
         prefer_gnss = (accurate and accel_is_good) or self._baro.faulty
-        if not self._gnss.intermittent and prefer_gnss:
+        if not self._gnss.height_intermittent and prefer_gnss:
             self._baro.faulty = True
             self.start_gnss()
             return True
@@ -119,14 +125,14 @@ class Height:
     def _recover_from_gnss(self) -> bool:
         f = self._f
         newest = self._gnss.buffer.newest
-        inaccurate = newest is None or newest.vacc >= f.params.gnss.checks.req_vacc
+        accurate = newest is not None and newest.vacc < f.params.gnss.checks.req_vacc
         error = float(f.x[9]) - (self.offset - self._baro.newest_altitude + self._baro.offset)
         spread = (f.params.baro.noise ** 2 + f.cov.p[9, 9]) * max(f.params.baro.gate, 1.0) ** 2
-        consistent = abs(error) < spread and inaccurate
-        if not self._baro.faulty and (consistent or self._gnss.intermittent):
+        consistent = abs(error) < spread and not accurate
+        if not self._baro.faulty and (consistent or self._gnss.height_intermittent):
             self.start_baro()
             return True
-        return not self._gnss.intermittent
+        return not self._gnss.height_intermittent
 
     def _recover_from_vision(self) -> bool:
         if self._f.recent(self._vision.buffer.newest_time_us, VISION_RECENT_US):
@@ -155,14 +161,18 @@ class Height:
 
     def start_gnss(self) -> None:
         """Make GNSS height the reference, without a step in height unless it is absolute."""
-        f = self._f
-        if f.flags.gps_hgt:
-            return
         self._select('gnss')
+        self._tie_gnss()
+
+    def _tie_gnss(self) -> None:
+        """Take the present height to be that of the last fix where GNSS has just taken over."""
+        f = self._f
         if f.params.height.gnss_absolute:
             self.offset = 0.0
         elif not f.gps_hgt_before:
-            altitude = 0.0 if f.fix is None else f.fix.altitude
+            newest = self._gnss.buffer.newest
+            fix = newest if f.fix is None or math.isnan(f.fix.altitude) else f.fix
+            altitude = 0.0 if fix is None else fix.altitude
             self.offset = altitude - f.earth.alt_ref + float(f.x[9])
 
     def start_vision(self) -> None:
@@ -181,13 +191,13 @@ class Height:
                 down = -self._baro.newest_altitude + self._baro.offset
                 self._resets.vertical_position(down, f.params.baro.noise ** 2)
         elif f.flags.gps_hgt:
-            if not self._gnss.intermittent and newest is not None:
+            if not self._gnss.height_intermittent and newest is not None:
                 down = self.offset - newest.altitude + f.earth.alt_ref
                 self._resets.vertical_position(down, newest.vacc ** 2)
                 self._baro.offset = self._baro.newest_altitude + down
         elif f.flags.ev_hgt:
             self._reset_to_vision()
-        if (f.flags.gps and not self._gnss.intermittent and newest is not None
+        if (f.flags.gps and not self._gnss.height_intermittent and newest is not None
                 and newest.has_velocity):
             variance = (VERTICAL_NOISE_RATIO * newest.sacc) ** 2
             self._resets.vertical_velocity(float(newest.velocity[2]), variance)
@@ -216,7 +226,9 @@ class Height:
             self._prefer_baro(gnss_popped)
         if not self._f.flags.baro_hgt and self._baro.popped:
             self._baro.follow()
-        if not self._f.flags.has_height():
+        if self._f.flags.has_height():
+            self._last_known_down = float(self._f.x[9])
+        else:
             self._hold()
 
     def _prefer_baro(self, gnss_popped: bool) -> None:
@@ -224,20 +236,21 @@ class Height:
         if self._baro.popped and not self._baro.faulty:
             self.start_baro()
             self._baro.fuse()
-        elif f.flags.gps_hgt and gnss_popped and not self._gnss.intermittent:
+        elif f.flags.gps_hgt and gnss_popped and not self._gnss.height_intermittent:
+            self._tie_gnss()
             self._fuse_gnss()
 
     def _prefer_gnss(self, gnss_popped: bool) -> None:
         f = self._f
         may_start = (f.fix is not None and math.isfinite(f.fix.altitude)
-                     and f.earth.has_origin and not self._gnss.intermittent
+                     and f.earth.has_origin and not self._gnss.height_intermittent
                      and self._checks.healthy_at_arrival)
         if not f.flags.gps_hgt and may_start:
             self.start_gnss()
         if f.flags.gps_hgt and gnss_popped:
             self._fuse_gnss()
-        elif f.flags.baro_hgt and self._baro.popped and not self._baro.faulty:
-            self._baro.fuse()
+        else:
+            self._fall_back_to_baro()
 
     def _prefer_vision(self, vision_popped: bool) -> None:
         f = self._f
@@ -246,7 +259,16 @@ class Height:
             self.reset()
         if f.flags.ev_hgt and vision_popped:
             self._fuse_vision()
-        elif f.flags.baro_hgt and self._baro.popped and not self._baro.faulty:
+        else:
+            self._fall_back_to_baro()
+
+    def _fall_back_to_baro(self) -> None:
+        """Fuse the barometer where it is the source, or where there is none."""
+        if not self._baro.popped or self._baro.faulty:
+            return
+        if not self._f.flags.has_height() and self._baro.offset_known:
+            self.start_baro()
+        if self._f.flags.baro_hgt:
             self._baro.fuse()
 
     # ---- fusion ----
@@ -274,11 +296,20 @@ class Height:
                                f.params.vision.pos_gate)
 
     def _hold(self) -> None:
-        """Keep height bounded until the reference is there."""
+        """Hold the last known height without a source, unless a velocity tells how it changes."""
         f = self._f
-        if f.late(f.observations.fake_height.time_us, SECOND // 5):
-            fuse_vertical_position(f, f.observations.fake_height, float(f.x[9]),
-                                   NO_HEIGHT_NOISE ** 2, RATIO_LIMIT * CLIP_COUNT_MAX)
+        climb_known = (f.recent(f.times.ver_vel, SECOND)
+                       and f.cov.p[6, 6] < KNOWN_CLIMB_VARIANCE)
+        if climb_known:
+            self._last_known_down = float(f.x[9])
+        elif f.late(f.observations.fake_height.time_us, HOLD_INTERVAL_US):
+            fuse_vertical_position(f, f.observations.fake_height,
+                                   float(f.x[9]) - self._last_known_down, NO_HEIGHT_NOISE ** 2,
+                                   HOLD_GATE)
+
+    def move(self, shift: float) -> None:
+        """Shift the held height down in m: the frame has moved, not the vehicle."""
+        self._last_known_down += shift
 
     def active_record(self) -> Observation | None:
         """Return the record of the selected source."""

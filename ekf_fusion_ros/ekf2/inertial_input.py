@@ -29,6 +29,7 @@ class InertialInput:
         self._observation_length = observation_length
         self._moving_scaler = moving_scaler
         self.dt_avg = 0.0
+        self.started = False
         self.last_us = 0
         self.min_interval_us = 0
         self.vibration = np.zeros(3)
@@ -50,6 +51,7 @@ class InertialInput:
     def add(self, sample: ImuSample, in_air: bool) -> bool:
         """Take a raw sample; True when it completed a filter period."""
         dt = min(max(1e-6 * (sample.time_us - self.last_us), DT_MIN), DT_MAX)
+        self.started = True
         self.last_us = sample.time_us
         self.dt_avg = 0.8 * self.dt_avg + 0.2 * dt
         self._limits[2] = RATE_LIMIT * self._moving_scaler * dt

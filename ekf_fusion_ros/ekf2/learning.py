@@ -44,6 +44,8 @@ class AccelBiasLearning:
     def check_consistency(self) -> None:
         """Forget a bias that both vertical velocity and height have opposed for 7 s."""
         f = self._f
+        if f.cov.inhibited.all():
+            return
         down_bias = float(f.x[13:16].dot(f.rot[2]))
         limit = 0.9 * f.params.imu.accel_bias_limit * f.dt_avg
         if abs(down_bias) <= limit or not self._opposed(down_bias):

@@ -20,7 +20,7 @@ class Validity:
         """Run once per filter period, last."""
         f = self._f
         times, flags = f.times, f.flags
-        newest = max(times.hor_pos, times.hor_vel, times.del_pos)
+        newest = max(times.hor_pos, times.hor_vel)
         aided = ((flags.gps or flags.ev_pos or flags.ev_vel)
                  and f.recent(newest, AIDING_RECENT_US))
         flow_aided = flags.opt_flow and f.recent(times.flow, AIDING_RECENT_US)

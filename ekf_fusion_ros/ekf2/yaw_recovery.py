@@ -63,7 +63,7 @@ class YawRecovery:
             self._last_reset_us = f.t_now
             self._count += 1
             times = f.times
-            times.hor_pos = times.del_pos = times.hor_vel = times.flow = f.t_now
+            times.hor_pos = times.hor_vel = times.flow = f.t_now
         return True
 
     def _yaw_failed(self, timed_out: bool) -> bool:

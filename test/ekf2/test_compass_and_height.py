@@ -11,7 +11,10 @@ import pytest
 
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 from ekf_fusion_ros.params.ekf2 import GnssParams
+from ekf_fusion_ros.params.ekf2 import HeightParams
 from ekf_fusion_ros.params.ekf2 import MagParams
+from ekf_fusion_ros.params.ekf2 import VisionParams
+from ekf_fusion_ros.samples import VelocityFrame
 
 NO_FIXES = GnssParams(enabled=False)
 
@@ -106,3 +109,54 @@ def test_an_accelerometer_at_its_range_raises_the_velocity_noise():
     growth = 50 * 0.049 ** 2
     assert 0.4 * growth < bench.p[6] - before[2] < growth
     assert abs(bench.p[4] - before[0]) < 0.1 * growth
+
+
+def climbed(*, sending):
+    """Climb 30 m on GNSS height with the velocity of odometry, then lose the fixes for 30 s."""
+    bench = Bench(Ekf2Params(height=HeightParams(reference='gnss'),
+                             vision=VisionParams(use_velocity=True)))
+    bench.sending = {'mag', 'fix', 'vision'} | sending
+    bench.odometry.frame = VelocityFrame.BODY_FRD
+    bench.run(20.0)
+    for speed, seconds in ((1.0, 30.0), (0.0, 5.0)):
+        bench.fix.velocity = bench.odometry.velocity = np.array((0.0, 0.0, -speed))
+        for _ in range(round(10.0 * seconds)):
+            bench.fix.alt += 0.1 * speed
+            bench.altitude += 0.1 * speed
+            bench.run(0.1)
+    bench.sending.discard('fix')
+    bench.run(30.0)
+    return bench
+
+
+def test_height_is_dead_reckoned_where_odometry_tells_the_climb():
+    bench = climbed(sending=set())
+    assert not {'gps_hgt', 'baro_hgt'} & bench.flags
+    assert bench.x[9] == pytest.approx(-30.0, abs=1.0)
+
+
+def test_height_is_held_where_nothing_tells_the_climb():
+    bench = climbed(sending=set())
+    bench.sending.discard('vision')
+    bench.run(30.0)
+    assert bench.x[9] == pytest.approx(-30.0, abs=2.0)
+
+
+def test_the_barometer_takes_over_when_gnss_height_ends():
+    bench = climbed(sending={'baro'})
+    assert 'baro_hgt' in bench.flags
+    bench.altitude += 1.0
+    bench.run(20.0)
+    assert bench.x[9] == pytest.approx(-31.0, abs=1.0)
+
+
+def test_fixes_without_altitude_cannot_take_over_the_height():
+    bench = Bench()
+    bench.sending = {'mag', 'baro', 'fix'}
+    bench.run(15.0)
+    bench.fix.alt = math.nan
+    bench.sending.discard('baro')
+    bench.run(10.0)
+    assert 'gps' in bench.flags
+    assert 'gps_hgt' not in bench.flags
+    assert np.isfinite(bench.x).all()

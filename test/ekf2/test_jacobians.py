@@ -243,7 +243,7 @@ def test_inertial_noise_reaches_attitude_and_velocity():
     q = from_scipy(Rotation.from_euler('ZYX', (0.3, 0.2, -0.4)).as_quat())
     x = np.zeros(24)
     x[0:4] = q
-    cov.predict(x, np.zeros(8), 0.01, False, (False, False, False), 0.0)
+    cov.predict(x, np.zeros(8), 0.01, False, (False, False, False))
     attitude = pose_covariance(q, cov.p)[3:6, 3:6]
     np.testing.assert_allclose(attitude, (0.01 * 1.5e-2) ** 2 * np.eye(3), atol=1e-15)
     np.testing.assert_allclose(cov.p[4:7, 4:7], (0.01 * 0.35) ** 2 * np.eye(3), atol=1e-15)
@@ -255,6 +255,6 @@ def test_a_clipped_axis_is_noisy_in_its_own_direction():
     turn = Rotation.from_euler('ZYX', (0.3, 0.2, -0.4))
     x = np.zeros(24)
     x[0:4] = from_scipy(turn.as_quat())
-    cov.predict(x, np.zeros(8), 0.01, False, (False, True, False), 0.0)
+    cov.predict(x, np.zeros(8), 0.01, False, (False, True, False))
     own = turn.as_matrix().T @ cov.p[4:7, 4:7] @ turn.as_matrix()
     np.testing.assert_allclose(own, np.diag((0.0035, 0.049, 0.0035)) ** 2, atol=1e-15)

@@ -63,6 +63,11 @@ class Barometer:
             self.count += 1
 
     @property
+    def offset_known(self) -> bool:
+        """True once a sample has tied pressure altitude to the height of the filter."""
+        return self.count > 0
+
+    @property
     def newest_altitude(self) -> float:
         """Altitude of the newest sample, whether or not the horizon has passed it."""
         return 0.0 if self.buffer.newest is None else float(self.buffer.newest[0])
@@ -77,6 +82,10 @@ class Barometer:
 
     def follow(self) -> None:
         """Let the offset follow slowly while another sensor is the reference."""
+        if not self.offset_known:
+            self.offset = self.altitude + float(self._f.x[9])
+            self.count = 1
+            return
         elapsed = min(max(1e-6 * (self._time_us - self._previous_us), 0.0), 1.0)
         rate = OFFSET_GAIN * (self.altitude + float(self._f.x[9]) - self.offset)
         self.offset += elapsed * min(max(rate, -OFFSET_RATE_MAX), OFFSET_RATE_MAX)

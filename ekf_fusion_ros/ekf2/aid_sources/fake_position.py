@@ -40,7 +40,6 @@ class FakePosition:
         f.last_known_position = f.x[7:9].copy()
         self._resets.position_to_aiding()
         self._resets.velocity_to_aiding(gnss_healthy)
-        f.position_is_relative = False
         if self._fused_us != 0:
             f.events.add(f.t_now, EventKind.NAVIGATION_STOPPED)
 

@@ -54,7 +54,7 @@ class Gnss:
         self._recovery = recovery
         self.buffer: SampleBuffer[GnssFix] = SampleBuffer(capacity)
         self.last_arrival_us = 0
-        self.intermittent = True
+        self.height_intermittent = True
         self.vision_yaw_forbidden = False
         self._previous_fix_us = 0
         self._velocity_nis = 1.0
@@ -74,7 +74,8 @@ class Gnss:
             return False
         self.last_arrival_us = sample.time_us
         self._checks.run(sample)
-        origin_set = initialised and not f.earth.has_origin and self._checks.healthy
+        places_origin = initialised and not f.earth.has_origin and self._checks.healthy
+        origin_set = places_origin and math.isfinite(sample.alt)
         if origin_set:
             self._set_origin(sample)
         elif not f.earth.has_origin and sample.eph < 1000.0:
@@ -189,10 +190,10 @@ class Gnss:
         has_compass = f.params.mag.type != 'none'
         if flags.yaw_align and not flags.ev_yaw and not (has_compass and f.yaw_reset_requested):
             return True
+        self.vision_yaw_forbidden = True
         if flags.ev_yaw:
             # yaw of the odometry frame: its heading against north is not known
             flags.ev_yaw = False
-            self.vision_yaw_forbidden = True
             if not has_compass:
                 flags.yaw_align = False
                 self._recovery.request()
@@ -240,7 +241,7 @@ class Gnss:
         f = self._f
         times = f.times
         limit = round(f.params.aiding.reset_timeout * SECOND)
-        newest = max(times.hor_pos, times.del_pos, times.hor_vel, times.flow)
+        newest = max(times.hor_pos, times.hor_vel, times.flow)
         return f.late(newest, limit) or f.late(times.hor_pos, 2 * limit)
 
     def _recover_or_reset(self) -> None:
@@ -286,8 +287,7 @@ class Gnss:
             self._adapt_accel_noise()
         noise = self._position_sigma(fix.hacc) ** 2 * self._repetition(fix.time_us)
         fuse_horizontal_position(f, f.observations.gps_hor_pos, position_innovation,
-                                 (noise, noise), params.pos_gate,
-                                 relative=f.position_is_relative)
+                                 (noise, noise), params.pos_gate)
 
     def _repetition(self, time_us: int) -> float:
         """Return how many fixes tell as much as one whose errors are independent.

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.filter import Filter
-from ekf_fusion_ros.ekf2.state import BODY_FIELD
 from ekf_fusion_ros.ekf2.state import EARTH_FIELD
 from ekf_fusion_ros.kernels.magnetic import DECLINATION_SPREAD
 from ekf_fusion_ros.kernels.magnetic import limit_field
@@ -124,8 +123,3 @@ def synthetic_z(f: Filter, measured: Array) -> float | None:
 def start_field_from(f: Filter, measured: Array) -> None:
     """Set the earth field to a measurement (3,) in body axes at the cached attitude."""
     f.x[EARTH_FIELD] = f.rot @ measured
-
-
-def zero_body_field(f: Filter) -> None:
-    """Forget the body field."""
-    f.x[BODY_FIELD] = 0.0

@@ -59,7 +59,6 @@ class VisionPosition:
         f = self._f
         position = np.nan_to_num(sample.position)
         covariance = np.diag(np.nan_to_num(sample.position_var))
-        f.position_is_relative = False
         if f.params.vision.rotate:
             position = f.rot_ev @ position
             covariance = f.rot_ev @ covariance @ f.rot_ev.T
