@@ -6,6 +6,10 @@ from enum import Enum
 
 from ekf_fusion_ros.messages.refusal import Refused
 
+# A pause this long may be a wild stamp, unless the messages come that rarely anyway.
+PAUSE_US = 1_000_000
+USUAL_STEPS = 4
+
 
 class Step(Enum):
     """How an inertial stamp follows the one before."""
@@ -27,13 +31,14 @@ def check_advance(time_us: int, last_us: int | None) -> None:
 class InertialOrder:
     """Judges the stamps that drive time.
 
-    A single wild stamp must not restart the filter, so a jump is believed when the next message
-    continues from it.
+    A single wild stamp must neither restart the filter nor run ahead of the good ones, so a jump
+    or a long pause is believed when the next message continues from it.
     """
 
     def __init__(self, jump_us: int) -> None:
         self._jump_us = jump_us
         self._suspect: int | None = None
+        self._step = jump_us
         self.last: int | None = None
 
     def judge(self, time_us: int) -> Step:
@@ -42,16 +47,21 @@ class InertialOrder:
             self.last = time_us
             return Step.FIRST
         step = time_us - self.last
-        if 0 < step <= self._jump_us:
-            self.last, self._suspect = time_us, None
-            return Step.FORWARD
         if -self._jump_us <= step <= 0:
             check_advance(time_us, self.last)
-        if self._suspect is not None and 0 < time_us - self._suspect <= self._jump_us:
-            self.last, self._suspect = time_us, None
-            return Step.RESTART
-        self._suspect = time_us
-        raise Refused('stamp_jump', f'stamp {step / 1e6:+.3f} s from the one before')
+        restart = abs(step) > self._jump_us
+        if (restart or step > self._longest_step()) and not self._continues_suspect(time_us):
+            self._suspect = time_us
+            raise Refused('stamp_jump', f'stamp {step / 1e6:+.3f} s from the one before')
+        self._step = self._jump_us if restart else step
+        self.last, self._suspect = time_us, None
+        return Step.RESTART if restart else Step.FORWARD
+
+    def _longest_step(self) -> int:
+        return max(PAUSE_US, USUAL_STEPS * self._step)
+
+    def _continues_suspect(self, time_us: int) -> bool:
+        return self._suspect is not None and 0 < time_us - self._suspect <= self._jump_us
 
 
 class AidingOrder:

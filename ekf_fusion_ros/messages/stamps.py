@@ -7,6 +7,7 @@ from typing import Any
 from ekf_fusion_ros.messages.refusal import Refused
 
 SECOND_US = 1_000_000
+NANOSECONDS = 1_000_000_000
 
 
 def microseconds(sec: int, nanosec: int) -> int:
@@ -23,9 +24,13 @@ def seconds_nanoseconds(time_us: int) -> tuple[int, int]:
 def stamp_of(message: Any) -> int:
     """Return the header stamp of a message in integer microseconds.
 
-    Raises Refused 'zero_stamp' for a stamp that is zero or negative.
+    Raises Refused 'zero_stamp' for a stamp that is zero or negative, 'bad_stamp' for nanoseconds
+    that fill a second or more.
     """
     stamp = message.header.stamp
+    if not 0 <= stamp.nanosec < NANOSECONDS:
+        raise Refused(
+            'bad_stamp', f'header.stamp.nanosec is {stamp.nanosec}: must be less than 1000000000')
     time_us = microseconds(stamp.sec, stamp.nanosec)
     if time_us <= 0:
         raise Refused(

@@ -32,3 +32,12 @@ def test_unstamped_messages_are_refused(build, sec, nanosec):
     with pytest.raises(Refused, match=r'header\.stamp') as refused:
         stamp_of(message)
     assert refused.value.reason == 'zero_stamp'
+
+
+@pytest.mark.parametrize('nanosec', [1_000_000_000, 4_000_000_000])
+def test_nanoseconds_beyond_a_second_are_refused(build, nanosec):
+    message = build.fix()
+    message.header = build.header(sec=1_700_000_000, nanosec=nanosec)
+    with pytest.raises(Refused, match=r'header\.stamp\.nanosec') as refused:
+        stamp_of(message)
+    assert refused.value.reason == 'bad_stamp'

@@ -265,6 +265,32 @@ def test_one_wild_inertial_stamp_restarts_nothing(build, estimator):
     assert estimator.now_us == round(1e6 * (START + 2))
 
 
+@pytest.mark.parametrize('leap', [1.5, 3.0, 4.9])
+def test_one_stamp_that_leaps_ahead_costs_no_other_message(build, estimator, leap):
+    session = session_of(estimator, 'imu', 'fix')
+    run_imu(session, build, START, START + 1)
+    session.handle('imu', build.imu(START + 1 + leap))
+    run_imu(session, build, START + 1.01, START + 2)
+    assert session.statistics()['imu'].refused == {'stamp_jump': 1}
+    assert estimator.now_us == round(1e6 * (START + 2))
+
+
+def test_a_long_pause_is_believed_with_the_second_message(build, estimator):
+    session = session_of(estimator, 'imu', 'fix')
+    run_imu(session, build, START, START + 1)
+    run_imu(session, build, START + 4, START + 5)
+    assert session.statistics()['imu'].refused == {'stamp_jump': 1}
+    assert estimator.resets == 0
+    assert estimator.now_us == round(1e6 * (START + 5))
+
+
+def test_messages_that_come_rarely_are_no_jumps(build, estimator):
+    session = session_of(estimator, 'imu', 'fix')
+    for second in range(0, 20, 2):
+        session.handle('imu', build.imu(START + second))
+    assert session.statistics()['imu'].refused == {}
+
+
 def test_ground_contact_is_left_to_the_estimator(build, estimator):
     run_imu(session_of(estimator, 'imu', 'fix'), build, START, START + 1)
     assert not estimator.of(LandedSample)
