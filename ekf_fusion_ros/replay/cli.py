@@ -164,7 +164,10 @@ def _check_role(role: str, option: str, *, wanted: bool) -> None:
 
 
 def _seconds(text: str) -> float:
-    value = float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
     if not math.isfinite(value) or value < 0:
         raise argparse.ArgumentTypeError(f'{text} is not a number of seconds from 0 on')
     return value

@@ -109,6 +109,7 @@ def _replay_bag(options: ReplayOptions, progress: Progress, say: Say) -> dict[st
         params = _with_roles(options.params, choice)
         progress.start_us = recording.start_ns // 1000
         progress.end_us = recording.end_ns // 1000
+        _check_start(options, progress)
         run = _Run(replace(options, params=params), list(choice.topics), progress)
         run.drive(_bag_steps(run, recording, choice))
         progress.notes = recording.notes
@@ -191,6 +192,13 @@ class _Run:
         for line in lines:
             say(line)
         return summary
+
+
+def _check_start(options: ReplayOptions, progress: Progress) -> None:
+    duration = (progress.end_us - progress.start_us) / 1e6
+    if options.start > duration:
+        raise ValueError(f'--start {options.start:g}: {options.recording} ends {duration:.1f} s '
+                         'after its start')
 
 
 def _make_folder(options: ReplayOptions) -> None:
@@ -278,7 +286,8 @@ def _samples(options: ReplayOptions, progress: Progress) -> Iterator[Sample]:
             yield sample
     except (ValueError, EOFError, OSError, zlib.error) as error:
         if not seen:
-            raise RecordingError(f'{options.recording}: {error}') from error
+            told = str(error).removeprefix(f'{options.recording.name}: ')
+            raise RecordingError(f'{options.recording}: {told}') from error
         progress.notes.append(f'{options.recording.name} is damaged and replayed as far as it '
                               f'can be read ({error})')
 

@@ -122,7 +122,7 @@ def _rows(path: Path) -> Iterator[tuple[int, str, Fields]]:
                 yield int(row[0]), row[1], [float(x) for x in row[2:]]
             except (ValueError, IndexError) as error:
                 raise SensorCsvError(
-                    f'{path.name}, row {number}: not "time_us,sensor,field,..." ({error})'
+                    f'{path.name}: row {number} is not "time_us,sensor,field,..." ({error})'
                 ) from error
 
 

@@ -98,6 +98,9 @@ class Recording:
                                      f'or a file ending in {", ".join(SUFFIXES)}')
             return [self.path], None
         present = sorted(p for p in self.path.iterdir() if p.name.endswith(SUFFIXES))
+        if not present and not (self.path / 'metadata.yaml').exists():
+            raise RecordingError(f'{self.path}: not a rosbag2 recording: the folder holds no file '
+                                 f'ending in {", ".join(SUFFIXES)}')
         try:
             text = (self.path / 'metadata.yaml').read_text(encoding='utf-8')
             about = yaml.load(text, LOADER)['rosbag2_bagfile_information']

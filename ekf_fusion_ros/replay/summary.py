@@ -17,6 +17,7 @@ from ekf_fusion_ros.session import FusionSession
 if TYPE_CHECKING:
     from ekf_fusion_ros.replay.runner import Progress
 
+SECOND_US = 1e6
 PACKAGES = ('ekf_fusion_ros', 'numpy', 'numba', 'rosbags')
 
 
@@ -34,28 +35,36 @@ def _content(
     options: ReplayOptions, session: FusionSession, choice: Choice, progress: Progress,
 ) -> dict[str, Any]:
     origin = session.origin
-    duration = (progress.end_us - progress.start_us) * 1e-6
+    duration = (progress.end_us - progress.start_us) / SECOND_US
+    replayed = _replayed(options, duration)
     return {
         'recording': str(options.recording),
-        'start': progress.start_us * 1e-6,
+        'start': progress.start_us / SECOND_US,
         'duration': duration,
+        'replayed': replayed,
         'frame': 'local' if session.local else 'map',
         'origin': None if origin is None else {
             'lat': origin.lat, 'lon': origin.lon, 'alt': origin.alt},
         'topics': _topics(session, choice),
         'aid_sources': {aid.name: _aid(aid) for aid in session.estimator.aid_statuses()},
-        'events': [{'time': event.time_us * 1e-6, 'text': event.text}
+        'events': [{'time': event.time_us / SECOND_US, 'text': event.text}
                    for event in progress.events],
         'resets': dict(session.resets()),
-        'alignment': {name: time_us * 1e-6 for name, time_us in session.milestones.items()},
+        'alignment': {name: time_us / SECOND_US for name, time_us in session.milestones.items()},
         'first_output': _seconds(progress.first_output_us),
         'rows': progress.rows,
         'notes': progress.notes,
         'cpu_seconds': progress.cpu_seconds,
         'kernel_loading_cpu_seconds': progress.kernel_seconds,
-        'real_time_factor': duration / max(progress.wall_seconds, 1e-9),
+        'real_time_factor': replayed / max(progress.wall_seconds, 1e-9),
         'versions': _versions(),
     }
+
+
+def _replayed(options: ReplayOptions, duration: float) -> float:
+    """Return how much of the recording, in s, lies between start and end of the options."""
+    end = duration if options.end is None else min(options.end, duration)
+    return max(end - options.start, 0.0)
 
 
 def _topics(session: FusionSession, choice: Choice) -> dict[str, Any]:
@@ -82,7 +91,7 @@ def _aid(aid: AidStatus) -> dict[str, Any]:
 
 
 def _seconds(time_us: int | None) -> float | None:
-    return None if time_us is None else time_us * 1e-6
+    return None if time_us is None else time_us / SECOND_US
 
 
 def _versions() -> dict[str, str]:
@@ -114,7 +123,7 @@ def _gist(summary: dict[str, Any]) -> list[str]:
             lines.append(f'{name}: {aid["fused"]} fused, {aid["rejected"]} rejected')
     speed = summary['real_time_factor']
     if math.isfinite(speed):
-        lines.append(f'{summary["duration"]:.1f} s in {summary["cpu_seconds"]:.1f} s of CPU, '
+        lines.append(f'{summary["replayed"]:.1f} s in {summary["cpu_seconds"]:.1f} s of CPU, '
                      f'{speed:.0f} times real time' + _loading(summary))
     return lines
 

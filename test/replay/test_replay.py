@@ -158,6 +158,7 @@ def test_start_and_end(flight, tmp_path):
     assert table[-1, 0] == pytest.approx(start + 20, abs=0.1)
     imu = next(topic for topic in about['topics'].values() if topic['role'] == 'imu')
     assert imu['received'] == pytest.approx(18 * 250, abs=3)
+    assert about['replayed'] == pytest.approx(18)
 
 
 def test_withheld_fixes_are_counted_and_not_fused(flight, replayed, tmp_path):
@@ -212,6 +213,8 @@ def test_parameters_in_order_of_files_then_set(flight, tmp_path):
     (['--withhold', 'fix=20:10'], 'ends before'),
     (['--start', '-1'], 'seconds from 0'),
     (['--start', '5', '--end', '4'], 'not after'),
+    (['--start', '500'], 'ends 30'),
+    (['--end', 'soon'], 'seconds from 0'),
     (['--rate', '-1'], 'at least 0'),
     (['--rate', 'fast'], 'invalid float'),
     (['--nonsense'], 'unrecognized'),
@@ -247,6 +250,22 @@ def test_foreign_recording_ends_with_1_and_one_sentence(tmp_path, capsys, name, 
     said = capsys.readouterr().err.strip()
     assert name in said
     assert '\n' not in said
+
+
+def test_a_folder_without_a_recording_ends_with_1(tmp_path, capsys):
+    assert run(tmp_path, tmp_path / 'out') == 1
+    said = capsys.readouterr().err
+    assert 'holds no file ending in .mcap' in said
+    assert 'metadata' not in said
+
+
+def test_the_name_of_a_sensor_csv_is_said_once(tmp_path, capsys):
+    path = tmp_path / 'rows.csv'
+    path.write_text('1000,baro,100.0\n')
+    assert run(path, tmp_path / 'out') == 1
+    said = capsys.readouterr().err
+    assert said.count('rows.csv') == 1
+    assert 'no imu row' in said
 
 
 def test_missing_topic_ends_with_1(flight, tmp_path, capsys):

@@ -155,7 +155,7 @@ def test_foreign_or_empty_files_are_refused_in_one_sentence(tmp_path, suffix, co
 def test_missing_and_unknown(tmp_path):
     with pytest.raises(RecordingError, match='does not exist'):
         Recording(tmp_path / 'none', ALL_TYPES)
-    with pytest.raises(RecordingError, match='cannot be read'):
+    with pytest.raises(RecordingError, match='holds no file'):
         Recording(tmp_path, ALL_TYPES)
     (tmp_path / 'flight.bag').write_bytes(b'#ROSBAG V2.0\n')
     with pytest.raises(RecordingError, match=r'\.mcap'):

@@ -46,5 +46,5 @@ class VisionHeading:
         f.rot_ev = relative_rotation(f.x[0:4], vision.quaternion)
         f.flags.yaw_align = True
         f.events.add(f.t_now, EventKind.YAW_ALIGNED_MOTION,
-                     f'odometry heading {math.degrees(sample.yaw):.0f} deg, '
+                     f'odometry x axis {-math.degrees(sample.yaw):.0f} deg from east, '
                      f'sigma {math.degrees(math.sqrt(sample.variance)):.0f} deg')
