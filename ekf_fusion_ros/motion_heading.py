@@ -19,7 +19,6 @@ from ekf_fusion_ros.samples import HeadingSample
 from ekf_fusion_ros.samples import VelocityFrame
 from ekf_fusion_ros.samples import VisionSample
 
-Complex = NDArray[np.complex128]
 Array = NDArray[np.float64]
 
 SECOND = 1_000_000

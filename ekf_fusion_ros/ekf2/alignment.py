@@ -21,7 +21,13 @@ from ekf_fusion_ros.mathlib.rotation import quat_from_matrix
 Array = NDArray[np.float64]
 
 SHARE = 0.1
+"""Share of a new sample in the low-pass of acceleration and rate."""
+
+DT_MIN = 1e-4
 RATE_MAX = math.radians(15.0)
+FORCE_MIN, FORCE_MAX = 0.8 * GRAVITY, 1.2 * GRAVITY
+"""Specific force in m/s^2 and rate in rad/s between which gravity tells the tilt."""
+
 WIND_VARIANCE = 1.0
 
 
@@ -43,7 +49,7 @@ class Alignment:
     def attempt(self, newest: DelayedImu) -> bool:
         """Use the newest filter period; True when tilt, yaw, height and P have been set."""
         increments = newest.increments
-        if increments[6] < 1e-4 or increments[7] < 1e-4:
+        if increments[6] < DT_MIN or increments[7] < DT_MIN:
             return False
         self._filter_inertial(increments[3:6] / increments[7], increments[0:3] / increments[6])
         self._mag.pop()
@@ -80,7 +86,7 @@ class Alignment:
     def _tilt_from_gravity(self) -> bool:
         f = self._f
         norm = float(np.linalg.norm(self._accel))
-        at_one_g = 0.8 * GRAVITY <= norm <= 1.2 * GRAVITY
+        at_one_g = FORCE_MIN <= norm <= FORCE_MAX
         if not at_one_g or float(np.linalg.norm(self._rate)) > RATE_MAX:
             return False
         unit = self._accel / norm

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 MODELS = 5
 WEIGHT_FLOOR = 1e-5
+FORCE_MIN, FORCE_MAX = 0.9 * GRAVITY, 1.1 * GRAVITY
+"""Specific force in m/s^2 between which gravity tells the tilt."""
 
 
 class YawEstimator:
@@ -82,7 +84,7 @@ class YawEstimator:
         share = min(10.0 * dt * TILT_GAIN, 1.0)
         self._accel = self._accel * (1.0 - share) + delta_velocity / dt * share
         norm = float(np.linalg.norm(delta_velocity)) / dt
-        if not 0.9 * GRAVITY < norm < 1.1 * GRAVITY:
+        if not FORCE_MIN < norm < FORCE_MAX:
             return
         down = -delta_velocity / np.linalg.norm(delta_velocity)
         # any horizontal axis will do; forward is none where the nose points up or down

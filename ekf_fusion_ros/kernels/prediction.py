@@ -22,6 +22,9 @@ from ekf_fusion_ros.mathlib.rotation import quat_normalise
 Array = NDArray[np.float64]
 GRAVITY = 9.80665
 NOMINAL_PERIOD = 0.01
+POSITION_LOST_VARIANCE = 1e4
+"""Horizontal position variance in m^2 (sum of both axes) from which it is not propagated."""
+
 FIELD_LEARNED_VARIANCE = 0.1
 WIND_LEARNED_VARIANCE = 1.0
 
@@ -153,6 +156,26 @@ def _add_unless_learned(p: Array, noise: Array, first: int, size: int, limit: fl
 
 
 @kernel
+def _add_input_noise(block: Array, f: Array, angle_var: float, velocity_var: Array) -> None:
+    """Add G Q G' to block (10, 10); G is minus the bias columns of F (10, 24).
+
+    The biases act on the same increments as the noise.
+    """
+    for i in range(4):
+        for j in range(4):
+            s = 0.0
+            for k in range(3):
+                s += f[i, 10 + k] * f[j, 10 + k]
+            block[i, j] += angle_var * s
+    for i in range(4, 7):
+        for j in range(4, 7):
+            s = 0.0
+            for k in range(3):
+                s += f[i, 13 + k] * f[j, 13 + k] * velocity_var[k]
+            block[i, j] += s
+
+
+@kernel
 def predict_covariance(
     p: Array, f: Array, x: Array, imu: Array, angle_var: float, velocity_var: Array, noise: Array,
     inhibited: Array, saved: Array, mag_active: bool, wind_active: bool,
@@ -167,24 +190,10 @@ def predict_covariance(
     wind blocks are zero.
     """
     fill_transition(x[0:4], imu[0:3] - x[10:13], imu[3:6] - x[13:16], NOMINAL_PERIOD, f)
-    frozen = p[7, 7] + p[8, 8] > 1e4
+    frozen = p[7, 7] + p[8, 8] > POSITION_LOST_VARIANCE
     top = f @ p
     block = top @ f.T
-    # G is minus the bias columns of F: the biases act on the same increments
-    g_angle = f[0:4, 10:13]
-    g_velocity = f[4:7, 13:16]
-    for i in range(4):
-        for j in range(4):
-            s = 0.0
-            for k in range(3):
-                s += g_angle[i, k] * g_angle[j, k]
-            block[i, j] += angle_var * s
-    for i in range(3):
-        for j in range(3):
-            s = 0.0
-            for k in range(3):
-                s += g_velocity[i, k] * g_velocity[j, k] * velocity_var[k]
-            block[4 + i, 4 + j] += s
+    _add_input_noise(block, f, angle_var, velocity_var)
     kept = p[7:9, :].copy()
     p[0:10, 10:24] = top[:, 10:24]
     p[10:24, 0:10] = top[:, 10:24].T

@@ -29,6 +29,9 @@ from ekf_fusion_ros.samples import GnssSample
 Array = NDArray[np.float64]
 
 VERTICAL_NOISE_RATIO = 1.5
+USABLE_ACCURACY = 1000.0
+"""Accuracy in m below which a fix tells the field and the rate of the earth."""
+
 DATA_TIMEOUT_US = 10 * SECOND
 DATA_TIMEOUT_AIDED_US = 1 * SECOND
 INTERMITTENT_US = 1 * SECOND
@@ -78,7 +81,7 @@ class Gnss:
         origin_set = places_origin and math.isfinite(sample.alt)
         if origin_set:
             self._set_origin(sample)
-        elif not f.earth.has_origin and sample.eph < 1000.0:
+        elif not f.earth.has_origin and sample.eph < USABLE_ACCURACY:
             known_before = f.earth.field is not None
             f.earth.look_around(sample.lat, sample.lon, sample.time_us)
             f.yaw_reset_requested |= not known_before and f.params.mag.type != 'none'

@@ -33,6 +33,17 @@ OBSERVABLE_MEMORY_US = 2 * SECOND
 FIELD_SETTLING_US = 5 * SECOND
 INHIBITED_TOO_LONG_US = 5 * SECOND
 STRENGTH_TOLERANCE = 0.2
+"""Plausible deviation in Gauss from the strength of the field model."""
+
+STRENGTH_ON_EARTH = 0.45
+STRENGTH_RANGE = 0.40
+"""Middle and half width in Gauss of what is found on the earth."""
+
+DECLINATION_SIGMA = 0.5
+DECLINATION_SIGMA_AT_START = 0.02
+"""Sigma in rad of the declination, and of the first one after the field is started."""
+
+LPF_SHARE = 0.1
 
 
 class Magnetometer:
@@ -79,7 +90,10 @@ class Magnetometer:
         if popped is None:
             return False
         measured = popped[1]
-        self.lpf = 0.9 * self.lpf + 0.1 * measured if self.count else measured.copy()
+        if self.count:
+            self.lpf = (1.0 - LPF_SHARE) * self.lpf + LPF_SHARE * measured
+        else:
+            self.lpf = measured.copy()
         self.count += 1
         self.field = measured
         if self._f.params.mag.synthesize_z:
@@ -122,7 +136,7 @@ class Magnetometer:
         field = self._f.earth.field
         if self._f.earth.has_origin and field is not None:
             return abs(strength - field.strength) > STRENGTH_TOLERANCE
-        return abs(strength - 0.45) > 0.40
+        return abs(strength - STRENGTH_ON_EARTH) > STRENGTH_RANGE
 
     def stop(self) -> None:
         """Stop heading and 3-axis fusion."""
@@ -223,13 +237,13 @@ class Magnetometer:
         all_states = f.t_horizon - self.aligned_us > FIELD_SETTLING_US
         if not self._declination_done:
             # the field direction is taken from the model first, so that yaw does not move
-            fuse_declination(f, 0.02)
+            fuse_declination(f, DECLINATION_SIGMA_AT_START)
             self._declination_done = True
             fuse_three_axes(f, self.field, all_states)
             return
         fuse_three_axes(f, self.field, all_states)
         if f.flags.mag_dec:
-            fuse_declination(f, 0.5)
+            fuse_declination(f, DECLINATION_SIGMA)
 
     def _fuse_heading(self) -> None:
         f = self._f
