@@ -82,13 +82,19 @@ def fuse_horizontal_position(
     return True
 
 
+def _judge_down(
+    f: Filter, record: Observation, state: int, innovation: float, noise: float, gate: float,
+) -> VerticalCheck:
+    variance = f.cov.p[state, state] + noise
+    record.record(f.t_now, (innovation,), (variance,), test_ratio(innovation, variance, gate))
+    return VerticalCheck(innovation / math.sqrt(variance), f.t_now)
+
+
 def fuse_vertical_velocity(
     f: Filter, record: Observation, innovation: float, noise: float, gate: float,
 ) -> bool:
     """Gate and fuse down velocity; innovation in m/s, noise variance in (m/s)^2."""
-    variance = f.cov.p[VD, VD] + noise
-    record.record(f.t_now, (innovation,), (variance,), test_ratio(innovation, variance, gate))
-    f.ver_vel_check = VerticalCheck(innovation / math.sqrt(variance), f.t_now)
+    f.ver_vel_check = _judge_down(f, record, VD, innovation, noise, gate)
     passed = record.test_ratio <= 1.0
     f.rejections.ver_vel = not passed
     if not passed:
@@ -96,7 +102,7 @@ def fuse_vertical_velocity(
         return False
     record.accept()
     f.times.ver_vel = f.t_now
-    f.faults.vel_d = not f.cov.fuse_direct(f.x, VD, variance, innovation)
+    f.faults.vel_d = not f.cov.fuse_direct(f.x, VD, record.variance[0], innovation)
     return True
 
 
@@ -104,9 +110,7 @@ def fuse_vertical_position(
     f: Filter, record: Observation, innovation: float, noise: float, gate: float,
 ) -> bool:
     """Gate and fuse down position; innovation in m, noise variance in m^2."""
-    variance = f.cov.p[PD, PD] + noise
-    record.record(f.t_now, (innovation,), (variance,), test_ratio(innovation, variance, gate))
-    f.ver_pos_check = VerticalCheck(innovation / math.sqrt(variance), f.t_now)
+    f.ver_pos_check = _judge_down(f, record, PD, innovation, noise, gate)
     passed = record.test_ratio <= 1.0
     f.rejections.ver_pos = not passed
     f.rejections.mag_judged_after_height = False
@@ -115,5 +119,5 @@ def fuse_vertical_position(
         return False
     record.accept()
     f.times.hgt = f.t_now
-    f.faults.pos_d = not f.cov.fuse_direct(f.x, PD, variance, innovation)
+    f.faults.pos_d = not f.cov.fuse_direct(f.x, PD, record.variance[0], innovation)
     return True
