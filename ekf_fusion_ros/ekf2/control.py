@@ -84,9 +84,12 @@ class Control:
 
         Barometer and ground move with the frame, so that they do not pull the height back.
         """
-        before = float(self._f.x[PD])
+        before, earth = float(self._f.x[PD]), self._f.earth
+        had_origin, altitude_before = earth.has_origin, earth.alt_ref
         if not self.gnss.move_origin(origin):
             return False
+        if not had_origin:
+            self.height.refer_to(earth.alt_ref - altitude_before)
         shift = float(self._f.x[PD]) - before
         self.baro.offset += shift
         self.height.move(shift)

@@ -121,7 +121,10 @@ class Ekf2:
 
     def _push_fix(self, sample: GnssSample) -> None:
         interval = self.inertial.min_interval_us
+        altitude_before = self.filter.earth.alt_ref
         origin_set = self.control.gnss.push(sample, interval, self.initialised)
+        if origin_set:
+            self.control.height.refer_to(self.filter.earth.alt_ref - altitude_before)
         if origin_set and self.params.height.reference == 'gnss':
             self.control.height.start_gnss()
 

@@ -175,6 +175,14 @@ class Height:
             altitude = 0.0 if fix is None else fix.altitude
             self.offset = altitude - f.earth.alt_ref + float(f.x[9])
 
+    def refer_to(self, rise: float) -> None:
+        """Keep GNSS height in use where it is when the origin first sets the reference altitude.
+
+        rise: change of the reference altitude in m, which the state does not follow.
+        """
+        if self._f.flags.gps_hgt and not self._f.params.height.gnss_absolute:
+            self.offset -= rise
+
     def start_vision(self) -> None:
         """Make odometry height the reference."""
         self._select('vision')

@@ -9,6 +9,7 @@ from ekf2.bench import Bench
 import numpy as np
 import pytest
 
+from ekf_fusion_ros.estimator import GeoPoint
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 from ekf_fusion_ros.params.ekf2 import GnssParams
 from ekf_fusion_ros.params.ekf2 import HeightParams
@@ -160,3 +161,18 @@ def test_fixes_without_altitude_cannot_take_over_the_height():
     assert 'gps' in bench.flags
     assert 'gps_hgt' not in bench.flags
     assert np.isfinite(bench.x).all()
+
+
+@pytest.mark.parametrize('by_hand', [False, True])
+def test_height_on_gnss_survives_the_setting_of_the_origin(by_hand):
+    bench = Bench()
+    bench.sending = {'mag', 'baro', 'fix'}
+    bench.run(2.0)
+    bench.sending.discard('baro')
+    bench.run(6.0)
+    assert 'gps_hgt' in bench.flags
+    if by_hand:
+        assert bench.ekf.set_origin(GeoPoint(bench.fix.lat, bench.fix.lon, 100.0))
+    bench.run(20.0)
+    assert 'gps' in bench.flags
+    assert bench.x[9] == pytest.approx(0.0, abs=0.1)
