@@ -32,7 +32,8 @@ class NavState:
     quaternion (4,) w, x, y, z body to earth; velocity (3,), position (3,) NED; angular_rate (3,)
     body rad/s, bias removed; acceleration (3,) earth, gravity removed. pose_cov (6, 6): position
     NED then small rotations about the earth axes; velocity_cov (3, 3) NED. Covariances are those
-    of the fusion horizon.
+    of the fusion horizon. gnss_started: fixes have been fused at least once, so that position is
+    one on the earth.
     """
 
     time_us: int
@@ -49,6 +50,7 @@ class NavState:
     dead_reckoning: bool
     local_position_valid: bool
     global_position_valid: bool
+    gnss_started: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 from typing import Any
 
+from ekf_fusion_ros.buffer import MAX_AGE_US
 from ekf_fusion_ros.messages.decode_odometry import has_true_heading
 from ekf_fusion_ros.messages.mounting import with_mounting
 
@@ -100,6 +101,22 @@ def _add_odometry_as_imu(wanted: dict[str, dict[str, Any]]) -> None:
     wanted['aiding'] = {'position_drift': 1.4, 'yaw_drift': 0.005, 'hold_yaw': False}
     wanted['gnss']['correlation_time'] = 3.0
     wanted['gnss']['reset_at_start'] = False
+
+
+def age_limit_us(params: Params, role: str) -> int:
+    """Return the age in us above which the filter could not fuse a sample of a role any more.
+
+    The horizon takes a sample up to MAX_AGE_US after it has passed it; holding takes its share.
+    """
+    ekf2, session = params.ekf2, params.session
+    if role == FIX_VELOCITY:
+        # it goes with its fix, and pairing tells which come too late for that
+        return round(1e6 * session.stamp_age_max)
+    delays = {FIX: ekf2.gnss.delay_ms, MAGNETIC_FIELD: ekf2.mag.delay_ms,
+              PRESSURE: ekf2.baro.delay_ms, ODOMETRY: ekf2.vision.delay_ms}
+    horizon_ms = max(ekf2.timing.horizon_min_ms, *delays.values())
+    usable_ms = horizon_ms - delays.get(role, 0.0) - session.hold_ms
+    return min(round(1e6 * session.stamp_age_max), round(1e3 * usable_ms) + MAX_AGE_US)
 
 
 def _horizon_ms(params: Params) -> float:

@@ -32,6 +32,7 @@ from ekf_fusion_ros.roles import FIX
 from ekf_fusion_ros.roles import FIX_VELOCITY
 from ekf_fusion_ros.roles import IMU
 from ekf_fusion_ros.roles import ODOMETRY
+from ekf_fusion_ros.roles import age_limit_us
 from ekf_fusion_ros.roles import configure
 from ekf_fusion_ros.sample_check import check_sample
 from ekf_fusion_ros.samples import GnssSample
@@ -99,17 +100,16 @@ class FusionSession:
         self._tick: int | None = None
         self._fixes: list[GnssSample] = []
         self._inertial_order = InertialOrder(round(SECOND_US * session.stamp_gap_max))
-        self._aiding_order = {role: self._new_order() for role in roles}
+        self._aiding_order = {role: self._new_order(role) for role in roles}
         self._heading = OdometryHeading()
         self._holding = Holding(round(1000 * session.hold_ms))
         self._pairing = self._new_pairing() if FIX_VELOCITY in roles else None
         self._inertial = InertialInput(self.params, self._inertial_role) if roles else None
         self._motion = make_motion_heading(self.params, roles)
 
-    def _new_order(self) -> AidingOrder:
-        session = self.params.session
-        return AidingOrder(round(SECOND_US * session.stamp_lead_max),
-                           round(SECOND_US * session.stamp_age_max))
+    def _new_order(self, role: str) -> AidingOrder:
+        return AidingOrder(round(SECOND_US * self.params.session.stamp_lead_max),
+                           age_limit_us(self.params, role))
 
     def _new_pairing(self) -> FixPairing:
         session = self.params.session
@@ -290,7 +290,7 @@ class FusionSession:
         note_milestones(self.milestones, nav)
         if not self._local:
             nav = self._at_home(nav)
-            if nav is None or not nav.yaw_aligned:
+            if nav is None or not (nav.yaw_aligned and nav.gnss_started):
                 return []
         fixes, self._fixes = tuple(self._fixes), []
         return [FusedOutput(nav, self._local, fixes)]

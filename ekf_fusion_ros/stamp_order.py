@@ -90,4 +90,5 @@ class AidingOrder:
         if lead > self._lead_us:
             raise Refused('stamp_ahead', f'stamp {lead / 1e6:.3f} s ahead of the inertial input')
         if lead < -self._age_us:
-            raise Refused('too_old', f'stamp {-lead / 1e6:.3f} s behind the inertial input')
+            raise Refused('too_old', f'stamp {-lead / 1e6:.3f} s behind the inertial input: raise '
+                          'session.horizon_ms where messages come that late')

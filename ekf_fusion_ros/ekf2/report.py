@@ -72,6 +72,7 @@ def nav_state(ekf: Ekf2) -> NavState:
         dead_reckoning=f.dead_reckoning,
         local_position_valid=validity.local_position,
         global_position_valid=validity.global_position,
+        gnss_started=f.observations.gps_hor_pos.starts > 0,
     )
 
 

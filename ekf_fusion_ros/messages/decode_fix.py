@@ -53,6 +53,8 @@ def decode_fix(message: Any, params: MessageParams) -> GnssSample:
         raise Refused('bad_latitude', f'latitude is {lat:g} deg: beyond 90')
     if abs(lon) > 180.0:
         raise Refused('bad_longitude', f'longitude is {lon:g} deg: beyond 180')
+    if lat == 0.0 and lon == 0.0:
+        raise Refused('zero_position', 'latitude and longitude are both 0: not a fix')
     if abs(alt) > MAX_ALTITUDE:
         raise Refused('bad_altitude', f'altitude is {alt:g} m: beyond {MAX_ALTITUDE:g}')
     eph, epv = accuracies(message, params.fix)

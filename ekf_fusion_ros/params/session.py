@@ -37,7 +37,8 @@ class SessionParams:
         2.0, 'Time by which an aiding stamp may lie ahead of the inertial stamps.', unit='s',
         min=0.1, max=60)
     stamp_age_max: float = param(
-        0.5, 'Age against the inertial stamps above which an aiding message is too old to fuse.',
+        0.5, 'Age against the inertial stamps above which an aiding message is refused; less '
+        'where the fusion horizon (horizon_ms) could not take it any more.',
         unit='s', min=0.05, max=60)
     pairing_tolerance: float = param(
         0.05, 'Largest difference of stamps of a fix and the velocity that belongs to it.',

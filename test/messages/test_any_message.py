@@ -84,6 +84,8 @@ def test_ros_classes_decode(package, kind, role):
         DECODERS[role](message, PARAMS)
     assert refused.value.reason == 'zero_stamp'
     message.header.stamp.sec = 7
+    if kind == 'NavSatFix':
+        message.latitude = 47.0
     if role == 'pressure':
         message.fluid_pressure = 101325.0
     elif role == 'magnetic_field':

@@ -168,3 +168,13 @@ def test_sitl_fixes_without_fix_are_counted(recorded):
         except Refused as refused:
             reasons.append(refused.reason)
     assert reasons == ['no_fix'] * 160
+
+
+def test_the_origin_of_latitude_and_longitude_is_no_fix(build):
+    message = build.fix(2)
+    message.latitude = message.longitude = 0.0
+    with pytest.raises(Refused) as refused:
+        decode_fix(message, PARAMS)
+    assert refused.value.reason == 'zero_position'
+    message.longitude = 6.7
+    assert decode_fix(message, PARAMS).lon == 6.7

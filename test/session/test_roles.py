@@ -6,6 +6,7 @@ import pytest
 
 from ekf_fusion_ros.params import Params
 from ekf_fusion_ros.params import with_overrides
+from ekf_fusion_ros.roles import age_limit_us
 from ekf_fusion_ros.roles import configure
 
 
@@ -73,3 +74,11 @@ def test_mounting_of_the_messages_becomes_the_lever_arm():
 def test_roles_that_cannot_be_fused(roles, word):
     with pytest.raises(ValueError, match=word):
         configure(Params(), roles)
+
+
+def test_fix_older_than_the_horizon_can_take_is_refused():
+    params = configure(Params(), {'odometry', 'fix'})
+    # 200 ms of horizon and 100 ms beyond it, less 110 ms of delay and 20 ms of holding
+    assert age_limit_us(params, 'fix') == 170_000
+    late = configure(with_overrides(Params(), {'session.horizon_ms': 700.0}), {'odometry', 'fix'})
+    assert age_limit_us(late, 'fix') == 500_000
