@@ -133,3 +133,15 @@ def fuse_field(
             return
         if outcome[axis] == 0:
             limit_field(x, declination, shortest)
+
+
+@kernel
+def observe_declination(x: Array, p: Array, hp: Array, gain: Array) -> float:
+    """Fill H P and P H' (24,) of atan2(east, north) of the earth field; return H P H', rad^2."""
+    north, east = x[16], x[17]
+    square = north * north + east * east
+    h_north, h_east = -east / square, north / square
+    for i in range(24):
+        hp[i] = h_north * p[16, i] + h_east * p[17, i]
+        gain[i] = h_north * p[i, 16] + h_east * p[i, 17]
+    return float(h_north * gain[16] + h_east * gain[17])

@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.filter import Filter
+from ekf_fusion_ros.ekf2.fusion import test_ratio
 from ekf_fusion_ros.ekf2.state import EARTH_FIELD
 from ekf_fusion_ros.kernels.magnetic import DECLINATION_SPREAD
 from ekf_fusion_ros.kernels.magnetic import limit_field
+from ekf_fusion_ros.kernels.magnetic import observe_declination
 from ekf_fusion_ros.kernels.magnetic import predict_field
 
 Array = NDArray[np.float64]
@@ -38,20 +40,21 @@ def fuse_three_axes(f: Filter, measured: Array, all_states: bool) -> bool:
     noise = max(params.noise, 1e-3) ** 2
     innovation, variance = np.empty(3), np.empty(3)
     predict_field(f.x, f.cov.p, measured, noise, innovation, variance)
-    for axis, name in enumerate(('mag_x', 'mag_y', 'mag_z')):
-        if variance[axis] < noise:
-            setattr(f.faults, name, True)
-            _restart_field_covariance(f)
-            return False
-        setattr(f.faults, name, False)
+    faults = f.faults
+    variances = variance.tolist()
+    faults.mag_x, faults.mag_y, faults.mag_z = (s < noise for s in variances)
+    if faults.mag_x or faults.mag_y or faults.mag_z:
+        _restart_field_covariance(f)
+        return False
     if f.flags.synthetic_mag_z:
         innovation[2] = 0.0
-    ratios = innovation ** 2 / (max(params.gate, 1.0) ** 2 * variance)
+    innovations = innovation.tolist()
+    ratios = [test_ratio(i, s, params.gate) for i, s in zip(innovations, variances, strict=True)]
     record = f.observations.mag
-    record.record(f.t_now, innovation.tolist(), variance.tolist(), float(ratios.max()))
+    record.record(f.t_now, innovations, variances, max(ratios))
     f.observations.yaw.test_ratio = 0.0
     rejections = f.rejections
-    rejections.mag_x, rejections.mag_y, rejections.mag_z = (ratios > 1.0).tolist()
+    rejections.mag_x, rejections.mag_y, rejections.mag_z = (ratio > 1.0 for ratio in ratios)
     rejections.mag_judged_after_height = True
     if record.test_ratio > 1.0:
         record.reject()
@@ -60,9 +63,9 @@ def fuse_three_axes(f: Filter, measured: Array, all_states: bool) -> bool:
     outcome = np.zeros(3)
     f.cov.fuse_field(f.x, innovation, 2 if f.flags.synthetic_mag_z else 3, noise, all_states,
                      table_declination(f), shortest_field(f), variance, outcome)
-    faults = f.faults
-    faults.mag_x, faults.mag_y, faults.mag_z = (outcome != 0.0).tolist()
-    if (outcome == 1.0).any():
+    codes = outcome.tolist()
+    faults.mag_x, faults.mag_y, faults.mag_z = (code != 0.0 for code in codes)
+    if 1.0 in codes:
         _restart_field_covariance(f)
     record.variance[:] = variance.tolist()
     return True
@@ -76,23 +79,19 @@ def _restart_field_covariance(f: Filter) -> None:
 
 def fuse_declination(f: Filter, sigma: float) -> None:
     """Fuse atan2(east, north) of the earth field with a sigma in rad."""
-    north, east = f.x[16], f.x[17]
+    north, east = float(f.x[16]), float(f.x[17])
     if abs(north) < MIN_FIELD * 1e-3:
         return
     noise = sigma * sigma
-    square = north * north + east * east
-    h = np.zeros(24)
-    h[16], h[17] = -east / square, north / square
-    gain = f.cov.p @ h
-    variance = float(gain @ h) + noise
+    hp, gain = np.empty(24), np.empty(24)
+    variance = observe_declination(f.x, f.cov.p, hp, gain) + noise
     if variance <= noise:
         f.faults.declination = True
         return
     innovation = math.atan2(east, north) - declination(f)
     innovation = min(max(innovation, -DECLINATION_SPREAD), DECLINATION_SPREAD)
-    hp = h @ f.cov.p
     gain /= variance
-    gain[13:16][f.cov.inhibited != 0.0] = 0.0
+    gain[13:16] *= 1.0 - f.cov.inhibited
     f.observations.declination.record(f.t_now, (innovation,), (variance,), 0.0)
     f.observations.declination.accept()
     f.faults.declination = not f.cov.fuse(f.x, gain, hp, innovation)
