@@ -149,11 +149,11 @@ def test_bad_messages_are_counted_and_the_node_lives_on(
     fuser = start_fuser()
     peer.connect(fuser, TWO_TOPICS)
     bad, fixes = list(bad_odometry().values()), bad_fixes()
-    stream = [odometry(9.8), odometry(9.9), odometry(9.9), odometry(9.85), *bad, odometry(11.0)]
+    stream = [odometry(9.8), odometry(9.9), odometry(9.9), odometry(9.85), *bad, odometry(10.7)]
     for number, message in enumerate(stream):
         peer.publish('odom', message)
         peer.until(lambda n=number: peer.count('odometry') == n + 1, fuser)
-    for number, message in enumerate([*fixes, fix(11.0)]):
+    for number, message in enumerate([*fixes, fix(10.7)]):
         peer.publish('fix', message)
         peer.until(lambda n=number: peer.count('fix') == n + 1, fuser)
     assert peer.count('odometry', 'accepted') == 3
