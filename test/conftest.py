@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 import tempfile
 
+from hypothesis import settings
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -30,6 +31,10 @@ os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
 os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
 os.environ.setdefault('MPLBACKEND', 'Agg')
 os.environ.setdefault('NUMBA_CACHE_DIR', _kernel_cache())
+
+# No test asserts time: the first example of one may have to compile a kernel.
+settings.register_profile('untimed', deadline=None)
+settings.load_profile('untimed')
 
 
 @pytest.fixture(scope='session')

@@ -29,7 +29,6 @@ STATUS_NO_FIX = -1
 STATUS_FIX = 0
 SERVICE_GPS = 1
 COVARIANCE_KNOWN = 3
-COVARIANCE_DIAGONAL_KNOWN = 2
 
 # C[i, j] of ENU is +-C[order[i], order[j]] of NED.
 _ORDER = np.array((1, 0, 2, 4, 3, 5))

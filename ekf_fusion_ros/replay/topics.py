@@ -36,10 +36,6 @@ class Choice:
     topics: dict[str, Topic] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
 
-    def role_of(self, topic: str) -> str:
-        """Return the role that a topic plays."""
-        return next(role for role, chosen in self.topics.items() if chosen.name == topic)
-
     def lines(self) -> list[str]:
         """Return the choice in words, one line a topic."""
         used = [f'{role}: {topic.name} ({topic.type}, {topic.count} messages)'
