@@ -12,27 +12,25 @@ from ekf_fusion_ros.ekf2.state import FILTER_PERIOD
 from ekf_fusion_ros.ekf2.state import SIZE
 from ekf_fusion_ros.kernels.magnetic import fuse_field
 from ekf_fusion_ros.kernels.prediction import GRAVITY
-from ekf_fusion_ros.kernels.prediction import predict_covariance
+from ekf_fusion_ros.kernels.prediction import PROCESS
+from ekf_fusion_ros.kernels.prediction import add_yaw_variance
+from ekf_fusion_ros.kernels.prediction import advance_covariance
+from ekf_fusion_ros.kernels.update import ACCEL_BIAS_VARIANCE_MAX
+from ekf_fusion_ros.kernels.update import MAG_ACTIVE
+from ekf_fusion_ros.kernels.update import WIND_ACTIVE
 from ekf_fusion_ros.kernels.update import apply_direct
 from ekf_fusion_ros.kernels.update import apply_pair
 from ekf_fusion_ros.kernels.update import apply_update
-from ekf_fusion_ros.kernels.update import limit_covariance
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 
 Array = NDArray[np.float64]
 
-NO_CLIPPING = (False, False, False)
+NO_AXES = (False, False, False)
+ALL_AXES = (True, True, True)
 BAD_ACCEL_NOISE = 4.9
 """Accelerometer noise in m/s^2 while it clips or contradicts the height aiding."""
 
-HEIGHT_RATE_TIME = 10.0
-"""Time constant in s of the height rate by which the wind changes faster."""
-
-WIND_NOISE_BY_HEIGHT_RATE = 0.5
-"""Relative growth of the wind noise per m/s of height rate: wind shears with height."""
-
-DRIFT_SPEED = 1.0
-"""Speed in m/s above which the position drift of dead reckoning grows no more."""
+BAD_ACCEL_VARIANCE = (FILTER_PERIOD * BAD_ACCEL_NOISE) ** 2
 
 
 class Covariance:
@@ -41,30 +39,31 @@ class Covariance:
     def __init__(self, params: Ekf2Params) -> None:
         """Start at zero; `initialise` gives the first values."""
         self.p: Array = np.zeros((SIZE, SIZE))
-        self.inhibited = np.zeros(3)
-        self._inhibited_axes = (False, False, False)
-        self._saved = np.zeros(3)
-        self._transition = np.zeros((10, SIZE))
+        self.limits: Array = np.zeros(6)
+        self.inhibited: Array = self.limits[0:3]
+        self.inhibited_axes = NO_AXES
         self._saved_ne = np.zeros((2, 2))
         self._saved_d_body = np.zeros(4)
-        self.mag_active = False
-        self.wind_active = False
-        self._accel_bias_var_max = (0.1 * GRAVITY * FILTER_PERIOD) ** 2
+        self._mag_active = False
+        self.limits[ACCEL_BIAS_VARIANCE_MAX] = (0.1 * GRAVITY * FILTER_PERIOD) ** 2
         imu, mag = params.imu, params.mag
         dt = FILTER_PERIOD
-        self._angle_var = (dt * min(imu.gyro_noise, 1.0)) ** 2
-        self._accel_var = np.full(3, (dt * min(imu.accel_noise, 1.0)) ** 2)
-        self._stated_accel_var = self._accel_var
-        self._bad_accel_var = np.full(3, (dt * BAD_ACCEL_NOISE) ** 2)
-        self._noise = np.zeros(SIZE)
-        self._noise[10:13] = (dt * dt * imu.gyro_bias_process_noise) ** 2
-        self._noise[13:16] = (dt * dt * imu.accel_bias_process_noise) ** 2
-        self._noise[16:19] = (dt * mag.earth_process_noise) ** 2
-        self._noise[19:22] = (dt * mag.body_process_noise) ** 2
-        self._height_rate = 0.0
-        self._wind_noise = dt * params.aiding.wind_process_noise
-        self._position_drift_var = dt * params.aiding.position_drift ** 2
-        self._yaw_drift_var = dt * params.aiding.yaw_drift ** 2
+        self._accel_var = self._stated_accel_var = (dt * min(imu.accel_noise, 1.0)) ** 2
+        self._bad_axes = NO_AXES
+        self._process = np.zeros(1, PROCESS)
+        process = self._process[0]
+        self._saved: Array = process['saved']
+        self._velocity_var: Array = process['velocity_var']
+        self._velocity_var[:] = self._accel_var
+        process['angle_var'] = (dt * min(imu.gyro_noise, 1.0)) ** 2
+        noise = process['noise']
+        noise[10:13] = (dt * dt * imu.gyro_bias_process_noise) ** 2
+        noise[13:16] = (dt * dt * imu.accel_bias_process_noise) ** 2
+        noise[16:19] = (dt * mag.earth_process_noise) ** 2
+        noise[19:22] = (dt * mag.body_process_noise) ** 2
+        process['wind_noise'] = dt * params.aiding.wind_process_noise
+        process['position_drift_var'] = dt * params.aiding.position_drift ** 2
+        process['yaw_drift_var'] = dt * params.aiding.yaw_drift ** 2
 
     def predict(
         self, x: Array, imu: Array, dt_avg: float, bad_accel: bool,
@@ -74,37 +73,45 @@ class Covariance:
 
         x (24,) the predicted state; imu (8,) raw increments; dt_avg mean filter period in s.
         """
-        self._accel_bias_var_max = (0.1 * GRAVITY * dt_avg) ** 2
-        velocity_var = self._accel_var
-        if bad_accel:
-            velocity_var = self._bad_accel_var
-        elif clipping != NO_CLIPPING:
-            velocity_var = np.where(clipping, self._bad_accel_var, self._accel_var)
-        noise = self._noise
-        self._height_rate += FILTER_PERIOD / HEIGHT_RATE_TIME * (float(x[6]) - self._height_rate)
-        if self.wind_active:
-            growth = 1.0 + WIND_NOISE_BY_HEIGHT_RATE * abs(self._height_rate)
-            noise[22:24] = (self._wind_noise * growth) ** 2
-        predict_covariance(self.p, self._transition, x, imu, self._angle_var, velocity_var, noise,
-                           self.inhibited, self._saved, self.mag_active, self.wind_active)
-        if self._position_drift_var > 0.0:
-            variance = self._position_drift_var * min(math.hypot(x[4], x[5]), DRIFT_SPEED)
-            self.p[7, 7] += variance
-            self.p[8, 8] += variance
-        if self._yaw_drift_var > 0.0:
-            self.add_yaw_variance(x[0:4], self._yaw_drift_var)
-        self._limit()
+        bad_axes = ALL_AXES if bad_accel else clipping
+        if bad_axes != self._bad_axes:
+            self._bad_axes = bad_axes
+            self._set_velocity_noise()
+        advance_covariance(self.p, x, imu, self.limits, self._process, dt_avg)
+
+    def _set_velocity_noise(self) -> None:
+        self._velocity_var[:] = np.where(self._bad_axes, BAD_ACCEL_VARIANCE, self._accel_var)
 
     def scale_accel_noise(self, factor: float) -> None:
         """Multiply the accelerometer variance, between what is stated and what clipping gets."""
-        self._accel_var = np.clip(self._accel_var * factor, self._stated_accel_var,
-                                  self._bad_accel_var)
+        self._accel_var = min(max(self._accel_var * factor, self._stated_accel_var),
+                              BAD_ACCEL_VARIANCE)
+        self._set_velocity_noise()
+
+    @property
+    def mag_active(self) -> bool:
+        """True while the field states are estimated."""
+        return self._mag_active
+
+    @mag_active.setter
+    def mag_active(self, active: bool) -> None:
+        self._mag_active = active
+        self.limits[MAG_ACTIVE] = active
+
+    @property
+    def wind_active(self) -> bool:
+        """True while the wind states are estimated."""
+        return bool(self.limits[WIND_ACTIVE])
+
+    @wind_active.setter
+    def wind_active(self, active: bool) -> None:
+        self.limits[WIND_ACTIVE] = active
 
     def inhibit_accel_bias(self, axes: tuple[bool, bool, bool]) -> None:
         """Freeze the estimation of some accelerometer biases, keeping their variance."""
-        if axes == self._inhibited_axes:
+        if axes == self.inhibited_axes:
             return
-        self._inhibited_axes = axes
+        self.inhibited_axes = axes
         for axis, inhibit in enumerate(axes):
             state = 13 + axis
             if inhibit and self.inhibited[axis] == 0.0:
@@ -116,23 +123,21 @@ class Covariance:
 
     def fuse_direct(self, x: Array, state: int, variance: float, innovation: float) -> bool:
         """Correct with an observation of one state; False on a numerical fault."""
-        return bool(apply_direct(
-            self.p, x, state, variance, innovation, self.inhibited, self._accel_bias_var_max,
-            self.mag_active, self.wind_active))
+        healthy: bool = apply_direct(self.p, x, state, variance, innovation, self.limits)
+        return healthy
 
     def fuse(self, x: Array, gain: Array, hp: Array, innovation: float) -> bool:
         """Correct with a gain (24,) and H P (24,); False on a numerical fault."""
-        return bool(apply_update(
-            self.p, x, gain, hp, innovation, self.inhibited, self._accel_bias_var_max,
-            self.mag_active, self.wind_active))
+        healthy: bool = apply_update(self.p, x, gain, hp, innovation, self.limits)
+        return healthy
 
     def fuse_pair(
         self, x: Array, first: int, variance: Sequence[float], innovation: Sequence[float],
     ) -> int:
         """Correct with observations of two neighbouring states; bit i is set for a fault of i."""
-        return int(apply_pair(
-            self.p, x, first, variance[0], variance[1], innovation[0], innovation[1],
-            self.inhibited, self._accel_bias_var_max, self.mag_active, self.wind_active))
+        faults: int = apply_pair(self.p, x, first, variance[0], variance[1], innovation[0],
+                                 innovation[1], self.limits)
+        return faults
 
     def fuse_field(
         self, x: Array, innovation: Array, axes: int, noise: float, all_states: bool,
@@ -140,7 +145,7 @@ class Covariance:
     ) -> None:
         """Correct with the first magnetometer axes; see kernels.magnetic.fuse_field."""
         fuse_field(x, self.p, innovation, axes, noise, all_states, declination, shortest,
-                   self.inhibited, self._accel_bias_var_max, self.wind_active, variance, outcome)
+                   self.limits, variance, outcome)
 
     def decorrelate(self, first: int, size: int) -> None:
         """Remove all correlations of states first .. first + size - 1, keeping variances."""
@@ -169,8 +174,7 @@ class Covariance:
 
     def add_yaw_variance(self, q: Array, variance: float) -> None:
         """Add variance in rad^2 about the earth's vertical."""
-        direction = 0.5 * np.array((-q[3], -q[2], q[1], q[0]))
-        self.p[0:4, 0:4] += variance * np.outer(direction, direction)
+        add_yaw_variance(self.p, q, variance)
 
     def activate_mag(self, active: bool) -> None:
         """Switch the field states on or off; their variances survive the pause."""
@@ -194,10 +198,6 @@ class Covariance:
     def _save_field(self) -> None:
         self._saved_ne = self.p[16:18, 16:18].copy()
         self._saved_d_body = np.diag(self.p)[18:22].copy()
-
-    def _limit(self) -> None:
-        limit_covariance(self.p, self.inhibited, self._accel_bias_var_max, self.mag_active,
-                         self.wind_active)
 
 
 def quat_by_rotation_vector(q: Array) -> Array:

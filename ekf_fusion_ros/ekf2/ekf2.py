@@ -145,13 +145,14 @@ class Ekf2:
         f = self.filter
         f.imu = self.inertial.ring[0]
         increments = f.imu.increments
-        f.dt_avg = advance_state(
+        learning = self._learning
+        f.dt_avg, peak_rate, peak_force, observable, down_bias = advance_state(
             f.x, f.rot, increments, f.earth.rate_ned, f.accel_lpf, f.dt_avg,
-            self.params.imu.accel_bias_limit, self._learning.peaks, self._learning.decay)
-        self._learning.step()
+            self.params.imu.accel_bias_limit, learning.peaks, learning.decay)
+        learning.step(peak_rate, peak_force, observable)
         f.cov.wind_active = f.flags.wind
         f.cov.predict(f.x, increments, f.dt_avg, f.faults.accel_vertical, f.imu.clipping)
-        self._learning.check_consistency()
+        learning.check_consistency(down_bias)
 
     def nav_state(self) -> NavState | None:
         """Return the state predicted to the newest IMU sample, None before initialisation."""

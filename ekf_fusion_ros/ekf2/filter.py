@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 MIN_PERIOD = 2.5e-3
 """Interval in s below which an increment says nothing about a rate."""
 
+NO_CLIPPING = (False, False, False)
+
 
 class DelayedImu(NamedTuple):
     """One filter period of inertial data: delta angle (3), delta velocity (3), both intervals."""
@@ -100,7 +102,7 @@ class Filter:
         self.x[0] = 1.0
         self.cov = Covariance(params)
         self.rot: Array = np.eye(3)
-        self.imu = DelayedImu(0, np.zeros(8), (False, False, False))
+        self.imu = DelayedImu(0, np.zeros(8), NO_CLIPPING)
         self.t_now = 0
         self.t_horizon = 0
         self.dt_imu_avg = 0.0

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from ekf_fusion_ros.ekf2.events import EventKind
+from ekf_fusion_ros.ekf2.filter import NO_CLIPPING
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.state import FILTER_PERIOD
 from ekf_fusion_ros.ekf2.state import SECOND
 
-OBSERVABLE_COS = 0.8
 INCONSISTENT_US = 7 * SECOND
+ALL_AXES = (True, True, True)
 
 
 class AccelBiasLearning:
@@ -23,30 +24,31 @@ class AccelBiasLearning:
         self.decay = 1.0 - FILTER_PERIOD / f.params.imu.accel_bias_learn_time
         self._consistent_us = 0
 
-    def step(self) -> None:
-        """Decide for each axis; once per filter period, before the covariance prediction."""
+    def step(self, peak_rate: float, peak_force: float, observable: int) -> None:
+        """Decide for each axis; once per filter period, before the covariance prediction.
+
+        Peaks in rad/s and m/s^2; bit k of `observable`: gravity shows the bias of axis k.
+        """
         f = self._f
         imu = f.params.imu
-        violent = (self.peaks[0] > imu.accel_bias_learn_gyro_limit
-                   or self.peaks[1] > imu.accel_bias_learn_accel_limit)
+        violent = (peak_rate > imu.accel_bias_learn_gyro_limit
+                   or peak_force > imu.accel_bias_learn_accel_limit)
         inhibit_all = imu.inhibit_accel_bias or violent or f.faults.accel_vertical
-        f.faults.accel_clipping = any(f.imu.clipping)
+        clipping = f.imu.clipping
+        f.faults.accel_clipping = clipping != NO_CLIPPING
         if inhibit_all:
-            f.cov.inhibit_accel_bias((True, True, True))
+            f.cov.inhibit_accel_bias(ALL_AXES)
         elif f.flags.in_air:
-            f.cov.inhibit_accel_bias(f.imu.clipping)
+            f.cov.inhibit_accel_bias(clipping)
         else:
-            tilt = f.rot[2].tolist()
-            x, y, z = (clipped or abs(cosine) <= OBSERVABLE_COS
-                       for clipped, cosine in zip(f.imu.clipping, tilt, strict=True))
+            x, y, z = (clipping[k] or not observable >> k & 1 for k in range(3))
             f.cov.inhibit_accel_bias((x, y, z))
 
-    def check_consistency(self) -> None:
-        """Forget a bias that both vertical velocity and height have opposed for 7 s."""
+    def check_consistency(self, down_bias: float) -> None:
+        """Forget a bias (m/s a period) that velocity and height have opposed for 7 s."""
         f = self._f
-        if f.cov.inhibited.all():
+        if f.cov.inhibited_axes == ALL_AXES:
             return
-        down_bias = float(f.x[13:16].dot(f.rot[2]))
         limit = 0.9 * f.params.imu.accel_bias_limit * f.dt_avg
         if abs(down_bias) <= limit or not self._opposed(down_bias):
             f.faults.accel_bias = False

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ekf_fusion_ros.kernels.output import correct_output
-from ekf_fusion_ros.kernels.output import propagate_output
+from ekf_fusion_ros.kernels.output import OUTPUT
+from ekf_fusion_ros.kernels.output import correct_predictor
+from ekf_fusion_ros.kernels.output import propagate_predictor
 from ekf_fusion_ros.mathlib.rotation import cross
 from ekf_fusion_ros.mathlib.rotation import quat_multiply
 from ekf_fusion_ros.params.ekf2 import OutputParams
@@ -25,16 +26,16 @@ class OutputPredictor:
     def __init__(self, params: OutputParams, history: int) -> None:
         """Keep as many periods of history as the fusion horizon is delayed."""
         self._params = params
-        self.now = np.zeros(10)
+        self._output = np.zeros(1, OUTPUT)
+        output = self._output[0]
+        self.now: Array = output['now']
         self.now[0] = 1.0
-        self.rot = np.zeros((3, 3))
-        self.rate = np.zeros(3)
-        self.yaw = np.zeros(2)
-        self.tracking_error = np.zeros(3)
+        self.rot: Array = output['rot']
+        self.rate: Array = output['rate']
+        self.yaw: Array = output['yaw']
+        self.tracking_error: Array = output['tracking_error']
         self._history = np.zeros((history, 10))
         self._pushed = 0
-        self._correction = np.zeros(3)
-        self._integral = np.zeros(6)
 
     def align(self, x: Array) -> None:
         """Start from the filter state (24,)."""
@@ -43,21 +44,19 @@ class OutputPredictor:
 
     def propagate(self, imu: ImuSample, x: Array, dt_imu_avg: float, dt_avg: float) -> None:
         """Advance by one raw IMU sample."""
-        propagate_output(self.now, self.rot, imu.delta_angle, imu.delta_velocity,
-                         imu.delta_angle_dt, imu.delta_velocity_dt, x, dt_imu_avg / dt_avg,
-                         self._correction, self.yaw, self.rate)
+        propagate_predictor(self._output, imu.delta_angle, imu.delta_velocity,
+                            imu.delta_angle_dt, imu.delta_velocity_dt, x, dt_imu_avg / dt_avg)
 
     def correct(self, x: Array, delay: float, dt_imu_avg: float, dt_avg: float) -> None:
         """Compare with the filter state (24,) that lies `delay` s in the past."""
         size = len(self._history)
-        self._history[self._pushed % size] = self.now
+        newest = self._pushed % size
         self._pushed += 1
         oldest = self._pushed % size if self._pushed >= size else 0
-        correct_output(self.now, self._history, oldest, x, self._integral,
-                       0.5 * dt_imu_avg / max(delay, dt_imu_avg),
-                       dt_avg / min(max(self._params.vel_tau, dt_avg), 10.0),
-                       dt_avg / min(max(self._params.pos_tau, dt_avg), 10.0),
-                       self._correction, self.tracking_error)
+        correct_predictor(self._output, self._history, newest, oldest, x,
+                          0.5 * dt_imu_avg / max(delay, dt_imu_avg),
+                          dt_avg / min(max(self._params.vel_tau, dt_avg), 10.0),
+                          dt_avg / min(max(self._params.pos_tau, dt_avg), 10.0))
 
     def velocity_at_origin(self, imu_position: Array) -> Array:
         """Return the velocity (3,) of the body origin, given the IMU position (3,) in the body."""

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.kernels.prediction import GRAVITY
+from ekf_fusion_ros.kernels.yaw_bank import BANK
+from ekf_fusion_ros.kernels.yaw_bank import MODELS
 from ekf_fusion_ros.kernels.yaw_bank import TILT_GAIN
 from ekf_fusion_ros.kernels.yaw_bank import advance_bank
 from ekf_fusion_ros.kernels.yaw_bank import combine_models
@@ -17,7 +19,6 @@ from ekf_fusion_ros.mathlib.rotation import with_yaw
 
 Array = NDArray[np.float64]
 
-MODELS = 5
 WEIGHT_FLOOR = 1e-5
 FORCE_MIN, FORCE_MAX = 0.9 * GRAVITY, 1.1 * GRAVITY
 """Specific force in m/s^2 between which gravity tells the tilt."""
@@ -32,14 +33,19 @@ class YawEstimator:
 
     def __init__(self) -> None:
         """Wait for a quiet moment to find the tilt."""
-        self.rot = np.tile(np.eye(3), (MODELS, 1, 1))
-        self.bias = np.zeros((MODELS, 3))
-        self.state = np.zeros((MODELS, 3))
-        self.cov = np.zeros((MODELS, 3, 3))
-        self.weights = np.full(MODELS, 1.0 / MODELS)
+        self._bank = np.zeros(1, BANK)
+        models = self._bank[0]
+        self.rot: Array = models['rot']
+        self.rot[:] = np.eye(3)
+        self.bias: Array = models['bias']
+        self.state: Array = models['state']
+        self.cov: Array = models['cov']
+        self.weights: Array = models['weights']
+        self.weights[:] = 1.0 / MODELS
         self.running = False
-        self._composite = np.array((0.0, (0.5 * math.pi) ** 2))
-        self._accel = np.zeros(3)
+        self._composite: Array = models['composite']
+        self._composite[1] = (0.5 * math.pi) ** 2
+        self._accel: Array = models['accel']
         self._tilt_aligned = False
         self._velocity: Array | None = None
         self._accuracy = 0.0
@@ -60,14 +66,13 @@ class YawEstimator:
             self._velocity = velocity
             self._align_tilt(imu)
             return
-        advance_bank(self.rot, self.bias, self.state, self.cov, imu, self._accel, airspeed,
-                     self.running)
-        if airborne and velocity is not None:
-            self._use(velocity, bias / dt)
-        elif not airborne:
+        advance_bank(self._bank, imu, airspeed, self.running)
+        if not airborne:
             self.running = False
-        if self.running:
-            combine_models(self.state, self.cov, self.weights, self._composite)
+        elif velocity is not None:
+            self._use(velocity, bias / dt)
+            if self.running:
+                combine_models(self.state, self.cov, self.weights, self._composite)
 
     @property
     def yaw(self) -> float:
@@ -82,7 +87,7 @@ class YawEstimator:
     def _align_tilt(self, imu: Array) -> None:
         delta_velocity, dt = imu[3:6], max(float(imu[7]), 1e-3)
         share = min(10.0 * dt * TILT_GAIN, 1.0)
-        self._accel = self._accel * (1.0 - share) + delta_velocity / dt * share
+        self._accel[:] = self._accel * (1.0 - share) + delta_velocity / dt * share
         norm = float(np.linalg.norm(delta_velocity)) / dt
         if not FORCE_MIN < norm < FORCE_MAX:
             return

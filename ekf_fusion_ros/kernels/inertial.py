@@ -19,6 +19,14 @@ TARGET_DT = np.float32(10.0) * np.float32(0.001)
 """Filter period in s. Single precision: which raw sample completes a filter period hangs on
 ties of this sum, and agreement with the reference filter needs the same ties."""
 
+INERTIAL = np.dtype([
+    ('quat', 'f8', (4,)), ('velocity', 'f8', (3,)), ('clock', 'f4', (2,)), ('sums', 'f8', (1,)),
+    ('previous', 'f8', (6,)), ('vibration', 'f8', (3,))])
+"""What down-sampling and vibration metrics keep between raw samples."""
+
+COMPLETE = 1
+MOVED = 2
+
 ADJUST_GAIN = np.float32(0.01)
 ADJUST_LIMIT = TARGET_DT / np.float32(2.0)
 
@@ -77,20 +85,25 @@ def accumulate_imu(
 
 @kernel
 def take_imu(
-    delta_angle: Array, delta_velocity: Array, angle_dt: float, velocity_dt: float,
-    quat: Array, velocity: Array, clock: NDArray[np.float32], sums: Array, out: Array,
-    previous: Array, metrics: Array, limits: Array, moved: NDArray[np.bool_],
-) -> bool:
-    """Run update_vibration and accumulate_imu on one raw sample.
+    state: NDArray[np.void], delta_angle: Array, delta_velocity: Array, angle_dt: float,
+    velocity_dt: float, angle_limit: float, velocity_limit: float, turn_limit: float, out: Array,
+) -> int:
+    """Run update_vibration and accumulate_imu on one raw sample; state is one INERTIAL.
 
-    moved (1,) tells whether angle vibration, velocity vibration or the angle of this sample exceed
-    limits (3,) in rad, m/s and rad.
+    Returns COMPLETE where out (8,) holds a filter period, plus MOVED where angle vibration,
+    velocity vibration or the angle of this sample exceed their limits in rad, m/s and rad.
     """
-    update_vibration(delta_angle, delta_velocity, previous, metrics)
+    s = state[0]
+    metrics = s['vibration']
+    update_vibration(delta_angle, delta_velocity, s['previous'], metrics)
     turned = math.sqrt(delta_angle[0] ** 2 + delta_angle[1] ** 2 + delta_angle[2] ** 2)
-    moved[0] = metrics[1] > limits[0] or metrics[2] > limits[1] or turned > limits[2]
-    return accumulate_imu(delta_angle, delta_velocity, angle_dt, velocity_dt, quat, velocity,
-                          clock, sums, out)
+    word = 0
+    if metrics[1] > angle_limit or metrics[2] > velocity_limit or turned > turn_limit:
+        word += MOVED
+    if accumulate_imu(delta_angle, delta_velocity, angle_dt, velocity_dt, s['quat'],
+                      s['velocity'], s['clock'], s['sums'], out):
+        word += COMPLETE
+    return word
 
 
 @kernel

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.kernels.compile import kernel
+from ekf_fusion_ros.kernels.update import WIND_ACTIVE
 from ekf_fusion_ros.kernels.update import apply_update
 
 Array = NDArray[np.float64]
@@ -66,7 +67,7 @@ def predict_field(
 @kernel
 def fuse_field_axis(
     x: Array, p: Array, axis: int, innovation: float, noise: float, all_states: bool,
-    inhibited: Array, accel_bias_var_max: float, wind_active: bool, variance: Array,
+    limits: Array, variance: Array,
 ) -> int:
     """Fuse one axis; 0 = done, 1 = innovation variance below the noise, 2 = P unhealthy.
 
@@ -81,15 +82,14 @@ def fuse_field_axis(
     variance[axis] = s
     gain = np.dot(p, h) / s
     for k in range(3):
-        if inhibited[k] != 0.0:
+        if limits[k] != 0.0:
             gain[13 + k] = 0.0
     if not all_states:
         gain[0:16] = 0.0
         gain[22:24] = 0.0
-    if not wind_active:
+    if limits[WIND_ACTIVE] == 0.0:
         gain[22:24] = 0.0
-    if apply_update(p, x, gain, hp, innovation, inhibited, accel_bias_var_max, True,
-                    wind_active):
+    if apply_update(p, x, gain, hp, innovation, limits):
         return 0
     return 2
 
@@ -117,8 +117,7 @@ def limit_field(x: Array, declination: float, shortest: float) -> None:
 @kernel
 def fuse_field(
     x: Array, p: Array, innovation: Array, axes: int, noise: float, all_states: bool,
-    declination: float, shortest: float, inhibited: Array, accel_bias_var_max: float,
-    wind_active: bool, variance: Array, outcome: Array,
+    declination: float, shortest: float, limits: Array, variance: Array, outcome: Array,
 ) -> None:
     """Fuse the first axes one after the other, each with the Jacobian at the newest state.
 
@@ -127,8 +126,7 @@ def fuse_field(
     """
     for axis in range(axes):
         outcome[axis] = fuse_field_axis(
-            x, p, axis, innovation[axis], noise, all_states, inhibited, accel_bias_var_max,
-            wind_active, variance)
+            x, p, axis, innovation[axis], noise, all_states, limits, variance)
         if outcome[axis] == 1:
             return
         if outcome[axis] == 0:

@@ -19,6 +19,34 @@ from ekf_fusion_ros.mathlib.rotation import quat_normalise
 
 Array = NDArray[np.float64]
 
+OUTPUT = np.dtype([
+    ('now', 'f8', (10,)), ('rot', 'f8', (3, 3)), ('correction', 'f8', (3,)), ('yaw', 'f8', (2,)),
+    ('rate', 'f8', (3,)), ('integral', 'f8', (6,)), ('tracking_error', 'f8', (3,))])
+"""What the output predictor keeps beside its history."""
+
+
+@kernel
+def propagate_predictor(
+    state: NDArray[np.void], delta_angle: Array, delta_velocity: Array, angle_dt: float,
+    velocity_dt: float, x: Array, bias_scale: float,
+) -> None:
+    """Run propagate_output on one OUTPUT."""
+    s = state[0]
+    propagate_output(s['now'], s['rot'], delta_angle, delta_velocity, angle_dt, velocity_dt, x,
+                     bias_scale, s['correction'], s['yaw'], s['rate'])
+
+
+@kernel
+def correct_predictor(
+    state: NDArray[np.void], history: Array, newest: int, oldest: int, x: Array, att_gain: float,
+    vel_gain: float, pos_gain: float,
+) -> None:
+    """Add the present of one OUTPUT to the history and run correct_output on it."""
+    s = state[0]
+    history[newest, :] = s['now']
+    correct_output(s['now'], history, oldest, x, s['integral'], att_gain, vel_gain, pos_gain,
+                   s['correction'], s['tracking_error'])
+
 
 @kernel
 def propagate_output(

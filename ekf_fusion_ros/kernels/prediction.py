@@ -14,6 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.kernels.compile import kernel
+from ekf_fusion_ros.kernels.update import ACCEL_BIAS_VARIANCE_MAX
+from ekf_fusion_ros.kernels.update import MAG_ACTIVE
+from ekf_fusion_ros.kernels.update import WIND_ACTIVE
+from ekf_fusion_ros.kernels.update import limit_covariance
 from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
 from ekf_fusion_ros.mathlib.rotation import quat_from_rotation_vector
 from ekf_fusion_ros.mathlib.rotation import quat_multiply
@@ -27,6 +31,25 @@ POSITION_LOST_VARIANCE = 1e4
 
 FIELD_LEARNED_VARIANCE = 0.1
 WIND_LEARNED_VARIANCE = 1.0
+OBSERVABLE_COS = 0.8
+"""Share of gravity along an accelerometer axis from which its bias shows at rest."""
+
+HEIGHT_RATE_TIME = 10.0
+"""Time constant in s of the height rate by which the wind changes faster."""
+
+WIND_NOISE_BY_HEIGHT_RATE = 0.5
+"""Relative growth of the wind noise per m/s of height rate: wind shears with height."""
+
+DRIFT_SPEED = 1.0
+"""Speed in m/s above which the position drift of dead reckoning grows no more."""
+
+PROCESS = np.dtype([
+    ('transition', 'f8', (10, 24)), ('angle_var', 'f8'), ('velocity_var', 'f8', (3,)),
+    ('noise', 'f8', (24,)), ('saved', 'f8', (3,)), ('height_rate', 'f8'), ('wind_noise', 'f8'),
+    ('position_drift_var', 'f8'), ('yaw_drift_var', 'f8')])
+"""What the covariance prediction keeps and is told: scratch for F, noise of the increments in
+rad^2 and (m/s)^2, additive noise of the states, variances of frozen accelerometer biases, low-passed
+height rate in m/s, sigma of the wind and drift variances per period."""
 
 
 @kernel
@@ -61,10 +84,12 @@ def predict_state(x: Array, rot: Array, imu: Array, earth_rate: Array, accel_lpf
 def advance_state(
     x: Array, rot: Array, imu: Array, earth_rate: Array, accel_lpf: Array, dt_avg: float,
     accel_bias_limit: float, peaks: Array, decay: float,
-) -> float:
-    """Predict and limit the state; return the mean filter period in s, given that before.
+) -> tuple[float, float, float, int, float]:
+    """Predict and limit the state; dt_avg is the mean filter period in s so far.
 
     peaks (2,) follow rate in rad/s and specific force in m/s^2; they fall by the factor decay.
+    Returns the new mean filter period, both peaks, a word with bit k set where gravity shows the
+    bias of accelerometer axis k, and the accelerometer bias along the vertical in m/s.
     """
     predict_state(x, rot, imu, earth_rate, accel_lpf)
     limit_state(x, dt_avg, accel_bias_limit)
@@ -74,7 +99,12 @@ def advance_state(
     peaks[1] = max(force, decay * peaks[1])
     mean_dt = float(0.5 * (imu[6] + imu[7]))
     mean_dt = min(max(mean_dt, 0.5 * NOMINAL_PERIOD), 2.0 * NOMINAL_PERIOD)
-    return 0.99 * dt_avg + 0.01 * mean_dt
+    observable = 0
+    for k in range(3):
+        if abs(rot[2, k]) > OBSERVABLE_COS:
+            observable += 1 << k
+    down_bias = x[13] * rot[2, 0] + x[14] * rot[2, 1] + x[15] * rot[2, 2]
+    return 0.99 * dt_avg + 0.01 * mean_dt, peaks[0], peaks[1], observable, down_bias
 
 
 @kernel
@@ -161,33 +191,60 @@ def _add_input_noise(block: Array, f: Array, angle_var: float, velocity_var: Arr
 
     The biases act on the same increments as the noise.
     """
-    for i in range(4):
-        for j in range(4):
-            s = 0.0
-            for k in range(3):
-                s += f[i, 10 + k] * f[j, 10 + k]
-            block[i, j] += angle_var * s
-    for i in range(4, 7):
-        for j in range(4, 7):
-            s = 0.0
-            for k in range(3):
-                s += f[i, 13 + k] * f[j, 13 + k] * velocity_var[k]
-            block[i, j] += s
+    angle = np.ascontiguousarray(f[0:4, 10:13])
+    velocity = np.ascontiguousarray(f[4:7, 13:16])
+    block[0:4, 0:4] += angle_var * np.dot(angle, angle.T)
+    block[4:7, 4:7] += np.dot(velocity * velocity_var, velocity.T)
+
+
+@kernel
+def advance_covariance(
+    p: Array, x: Array, imu: Array, limits: Array, process: NDArray[np.void], dt_avg: float,
+) -> None:
+    """Propagate P over one filter period of nominal length and limit it, in place.
+
+    process: one PROCESS; the rest as in predict_covariance. dt_avg mean filter period in s.
+    """
+    s = process[0]
+    noise = s['noise']
+    height_rate = s['height_rate']
+    height_rate += NOMINAL_PERIOD / HEIGHT_RATE_TIME * (x[6] - height_rate)
+    s['height_rate'] = height_rate
+    if limits[WIND_ACTIVE] != 0.0:
+        growth = 1.0 + WIND_NOISE_BY_HEIGHT_RATE * abs(height_rate)
+        noise[22:24] = (s['wind_noise'] * growth) ** 2
+    predict_covariance(p, s['transition'], x, imu, s['angle_var'], s['velocity_var'], noise,
+                       limits, s['saved'])
+    if s['position_drift_var'] > 0.0:
+        drift = s['position_drift_var'] * min(math.hypot(x[4], x[5]), DRIFT_SPEED)
+        p[7, 7] += drift
+        p[8, 8] += drift
+    if s['yaw_drift_var'] > 0.0:
+        add_yaw_variance(p, x, s['yaw_drift_var'])
+    limits[ACCEL_BIAS_VARIANCE_MAX] = (0.1 * GRAVITY * dt_avg) ** 2
+    limit_covariance(p, limits)
+
+
+@kernel
+def add_yaw_variance(p: Array, x: Array, variance: float) -> None:
+    """Add variance in rad^2 about the earth's vertical to the attitude of x (24,)."""
+    direction = 0.5 * np.array((-x[3], -x[2], x[1], x[0]))
+    p[0:4, 0:4] += variance * np.outer(direction, direction)
 
 
 @kernel
 def predict_covariance(
     p: Array, f: Array, x: Array, imu: Array, angle_var: float, velocity_var: Array, noise: Array,
-    inhibited: Array, saved: Array, mag_active: bool, wind_active: bool,
+    limits: Array, saved: Array,
 ) -> None:
     """P <- F P F' + G Q G' + N in place.
 
     p (24, 24); f (10, 24) scratch, zero where fill_transition does not write; x (24,) the
     predicted state; imu (8,) the raw increments; angle_var rad^2 and velocity_var (3,) (m/s)^2 of
-    the increments; noise (24,) the additive process noise. inhibited (3,) marks accelerometer axes
-    whose bias is not estimated: they keep the saved (3,) variance and no correlation with states 0
-    to 15 (that with field and wind survives, as in the reference filter). Inactive magnetic and
-    wind blocks are zero.
+    the increments; noise (24,) the additive process noise; limits (6,) see kernels.update. The
+    accelerometer axes whose bias is not estimated keep the saved (3,) variance and no correlation
+    with states 0 to 15 (that with field and wind survives, as in the reference filter). Inactive
+    magnetic and wind blocks are zero.
     """
     fill_transition(x[0:4], imu[0:3] - x[10:13], imu[3:6] - x[13:16], NOMINAL_PERIOD, f)
     frozen = p[7, 7] + p[8, 8] > POSITION_LOST_VARIANCE
@@ -203,13 +260,13 @@ def predict_covariance(
         p[:, 7:9] = kept.T
     for i in range(7, 16):
         p[i, i] += noise[i]
-    if mag_active:
+    if limits[MAG_ACTIVE] != 0.0:
         _add_unless_learned(p, noise, 16, 3, FIELD_LEARNED_VARIANCE)
         _add_unless_learned(p, noise, 19, 3, FIELD_LEARNED_VARIANCE)
-    if wind_active:
+    if limits[WIND_ACTIVE] != 0.0:
         _add_unless_learned(p, noise, 22, 2, WIND_LEARNED_VARIANCE)
     for k in range(3):
-        if inhibited[k] != 0.0:
+        if limits[k] != 0.0:
             p[13 + k, 0:16] = 0.0
             p[0:16, 13 + k] = 0.0
             p[13 + k, 13 + k] = saved[k]

@@ -14,6 +14,13 @@ from ekf_fusion_ros.mathlib.rotation import quat_normalise
 
 Array = NDArray[np.float64]
 
+MAG_ACTIVE = 3
+WIND_ACTIVE = 4
+ACCEL_BIAS_VARIANCE_MAX = 5
+"""Entries of `limits` (6,) behind the three that mark accelerometer axes whose bias is frozen: 1
+while the field and the wind states are estimated, and the largest variance of an accelerometer
+bias in (m/s)^2 per period."""
+
 VARIANCE_MIN = np.array([0.0] * 4 + [1e-6] * 6 + [0.0] * 3)
 VARIANCE_MAX = np.array([1.0] * 4 + [1e6] * 6 + [1.0] * 3)
 ACCEL_BIAS_VARIANCE_FLOOR = 5e-8
@@ -21,13 +28,11 @@ ACCEL_BIAS_VARIANCE_SAFE = 1e-9
 
 
 @kernel
-def limit_covariance(
-    p: Array, inhibited: Array, accel_bias_var_max: float, mag_active: bool, wind_active: bool,
-) -> None:
+def limit_covariance(p: Array, limits: Array) -> None:
     """Clamp the variances, make P symmetric, keep inactive blocks at zero, in place.
 
     The accelerometer-bias variances are kept within a ratio of 100; one that has collapsed
-    decorrelates all three. accel_bias_var_max in (m/s)^2 per period.
+    decorrelates all three.
     """
     diagonal = p.reshape(576)[::25]
     diagonal[0:13] = np.minimum(np.maximum(diagonal[0:13], VARIANCE_MIN), VARIANCE_MAX)
@@ -36,7 +41,7 @@ def limit_covariance(
     collapsed = False
     free = 0
     for k in range(3):
-        if inhibited[k] == 0.0:
+        if limits[k] == 0.0:
             free += 1
             variance = p[13 + k, 13 + k]
             if variance > largest:
@@ -46,21 +51,22 @@ def limit_covariance(
     if free > 0:
         lower = max(0.01 * largest, ACCEL_BIAS_VARIANCE_FLOOR)
         for k in range(3):
-            if inhibited[k] == 0.0:
-                p[13 + k, 13 + k] = min(max(p[13 + k, 13 + k], lower), accel_bias_var_max)
+            if limits[k] == 0.0:
+                p[13 + k, 13 + k] = min(max(p[13 + k, 13 + k], lower),
+                                      limits[ACCEL_BIAS_VARIANCE_MAX])
         if collapsed:
             for k in range(13, 16):
                 variance = p[k, k]
                 p[k, :] = 0.0
                 p[:, k] = 0.0
                 p[k, k] = variance
-    if mag_active:
+    if limits[MAG_ACTIVE] != 0.0:
         for k in range(16, 22):
             p[k, k] = min(max(p[k, k], 0.0), 1.0)
     else:
         p[16:22, :] = 0.0
         p[:, 16:22] = 0.0
-    if wind_active:
+    if limits[WIND_ACTIVE] != 0.0:
         for k in range(22, 24):
             p[k, k] = min(max(p[k, k], 0.0), 1e6)
     else:
@@ -70,8 +76,7 @@ def limit_covariance(
 
 @kernel
 def apply_update(
-    p: Array, x: Array, gain: Array, hp: Array, innovation: float, inhibited: Array,
-    accel_bias_var_max: float, mag_active: bool, wind_active: bool,
+    p: Array, x: Array, gain: Array, hp: Array, innovation: float, limits: Array,
 ) -> bool:
     """Subtract gain x hp from P and gain x innovation from x; False if P would turn negative.
 
@@ -91,7 +96,7 @@ def apply_update(
     if not healthy:
         return False
     p -= khp
-    limit_covariance(p, inhibited, accel_bias_var_max, mag_active, wind_active)
+    limit_covariance(p, limits)
     x -= gain * innovation
     x[0:4] = quat_normalise(x[0:4])
     return True
@@ -99,31 +104,26 @@ def apply_update(
 
 @kernel
 def apply_direct(
-    p: Array, x: Array, state: int, variance: float, innovation: float, inhibited: Array,
-    accel_bias_var_max: float, mag_active: bool, wind_active: bool,
+    p: Array, x: Array, state: int, variance: float, innovation: float, limits: Array,
 ) -> bool:
     """Update with an observation of one state whose innovation variance is given."""
     gain = p[:, state] / variance
     hp = p[state, :].copy()
-    return apply_update(p, x, gain, hp, innovation, inhibited, accel_bias_var_max, mag_active,
-                        wind_active)
+    return apply_update(p, x, gain, hp, innovation, limits)
 
 
 @kernel
 def apply_pair(
     p: Array, x: Array, first: int, variance_a: float, variance_b: float, innovation_a: float,
-    innovation_b: float, inhibited: Array, accel_bias_var_max: float, mag_active: bool,
-    wind_active: bool,
+    innovation_b: float, limits: Array,
 ) -> int:
     """Update with two neighbouring states, whose innovations were taken before the first.
 
     Returns a word whose bit i tells that the update of observation i was unhealthy.
     """
     faults = 0
-    if not apply_direct(p, x, first, variance_a, innovation_a, inhibited, accel_bias_var_max,
-                        mag_active, wind_active):
+    if not apply_direct(p, x, first, variance_a, innovation_a, limits):
         faults += 1
-    if not apply_direct(p, x, first + 1, variance_b, innovation_b, inhibited, accel_bias_var_max,
-                        mag_active, wind_active):
+    if not apply_direct(p, x, first + 1, variance_b, innovation_b, limits):
         faults += 2
     return faults

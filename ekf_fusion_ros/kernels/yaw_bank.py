@@ -28,12 +28,19 @@ VARIANCE_FLOOR = 1e-6
 CLIP_SIGMA = 5.0
 
 
+MODELS = 5
+BANK = np.dtype([
+    ('rot', 'f8', (MODELS, 3, 3)), ('bias', 'f8', (MODELS, 3)), ('state', 'f8', (MODELS, 3)),
+    ('cov', 'f8', (MODELS, 3, 3)), ('weights', 'f8', (MODELS,)), ('accel', 'f8', (3,)),
+    ('composite', 'f8', (2,))])
+"""The models, the low-passed specific force in m/s^2, and yaw and variance of the sum."""
+
+
 @kernel
-def advance_bank(
-    rot: Array, bias: Array, state: Array, cov: Array, imu: Array, accel: Array, airspeed: float,
-    running: bool,
-) -> None:
-    """Advance every model over imu (8,) and the low-passed accel (3,), in place."""
+def advance_bank(bank: NDArray[np.void], imu: Array, airspeed: float, running: bool) -> None:
+    """Advance every model of one BANK over imu (8,) and combine them, in place."""
+    s = bank[0]
+    rot, accel = s['rot'], s['accel']
     share = min(10.0 * imu[7] * TILT_GAIN, 1.0)
     dt = max(imu[7], 1e-3)
     for i in range(3):
@@ -44,9 +51,10 @@ def advance_bank(
     if airspeed > 0.0 and norm > GRAVITY:
         attenuation = 1.0
     excess = min(attenuation * abs(norm - GRAVITY) / GRAVITY, 1.0)
-    predict_attitudes(rot, bias, imu, accel, TILT_GAIN * (1.0 - excess) ** 2, airspeed)
+    predict_attitudes(rot, s['bias'], imu, accel, TILT_GAIN * (1.0 - excess) ** 2, airspeed)
     if running:
-        predict_models(rot, state, cov, imu)
+        predict_models(rot, s['state'], s['cov'], imu)
+        combine_models(s['state'], s['cov'], s['weights'], s['composite'])
 
 
 @kernel

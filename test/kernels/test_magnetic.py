@@ -23,7 +23,7 @@ from ekf_fusion_ros.kernels.magnetic import limit_field
 from ekf_fusion_ros.kernels.magnetic import predict_field
 
 NOISE = 0.05 ** 2
-NO_AXIS = np.zeros(3)
+ALL_FREE = np.array((0.0, 0.0, 0.0, 1.0, 1.0, 1.0))
 
 
 def field_in_body(x):
@@ -66,7 +66,7 @@ def test_update_is_that_of_the_information_form(axis):
     expected = np.linalg.inv(np.linalg.inv(p) + np.outer(h, h) / NOISE)
     gain = expected @ h / NOISE
     out = p.copy()
-    assert fuse_field_axis(x, out, axis, 0.03, NOISE, True, NO_AXIS, 1.0, True, variance) == 0
+    assert fuse_field_axis(x, out, axis, 0.03, NOISE, True, ALL_FREE, variance) == 0
     np.testing.assert_allclose(out, expected, rtol=1e-6, atol=1e-10)
     moved = before - 0.03 * gain
     moved[0:4] /= np.linalg.norm(moved[0:4])
@@ -77,7 +77,7 @@ def test_update_is_that_of_the_information_form(axis):
 def test_young_field_states_take_all_of_the_correction():
     x = state(np.array((1.0, 0.0, 0.0, 0.0)), np.array((0.2, 0.0, 0.43)), np.zeros(3))
     before = x.copy()
-    fuse_field_axis(x, covariance(5), 0, 0.03, NOISE, False, NO_AXIS, 1.0, True, np.zeros(3))
+    fuse_field_axis(x, covariance(5), 0, 0.03, NOISE, False, ALL_FREE, np.zeros(3))
     np.testing.assert_allclose(x[0:16], before[0:16], atol=1e-15)
     np.testing.assert_array_equal(x[22:24], before[22:24])
     assert abs(x[16] - before[16]) > 1e-4
@@ -92,7 +92,7 @@ def test_axes_in_sequence_are_one_vector_observation(axes):
     expected = np.linalg.inv(np.linalg.inv(p) + h.T @ h / NOISE)
     out, outcome = p.copy(), np.zeros(3)
     # Nothing was wrong, so that all axes are fused about the same state.
-    fuse_field(x, out, np.zeros(3), axes, NOISE, True, 0.24, 1e-3, NO_AXIS, 1.0, True,
+    fuse_field(x, out, np.zeros(3), axes, NOISE, True, 0.24, 1e-3, ALL_FREE,
                np.zeros(3), outcome)
     np.testing.assert_allclose(out, expected, rtol=1e-6, atol=1e-10)
     np.testing.assert_allclose(x, before, atol=1e-12)

@@ -86,7 +86,7 @@ def dense_prediction(p, x, imu):
 def predicted(p, x, imu, inhibited=(0.0, 0.0, 0.0), saved=(0.0, 0.0, 0.0), mag=True, wind=True):
     out = p.copy()
     predict_covariance(out, np.zeros((10, 24)), x, imu, ANGLE_VAR, VELOCITY_VAR, NOISE,
-                       np.array(inhibited), np.array(saved), mag, wind)
+                       np.array((*inhibited, mag, wind, 1.0), dtype=float), np.array(saved))
     return out
 
 

@@ -14,8 +14,7 @@ from ekf_fusion_ros.kernels.update import apply_pair
 from ekf_fusion_ros.kernels.update import apply_update
 from ekf_fusion_ros.kernels.update import limit_covariance
 
-FREE = np.zeros(3)
-WIDE = 1.0
+ALL_FREE = np.array((0.0, 0.0, 0.0, 1.0, 1.0, 1.0))
 
 
 def state(seed):
@@ -35,7 +34,7 @@ def test_update_is_that_of_the_information_form(seed):
     moved[0:4] /= np.linalg.norm(moved[0:4])
     gain = p @ h / (h @ p @ h + noise)
     out = p.copy()
-    assert apply_update(out, x, gain, h @ p, 0.01, FREE, WIDE, True, True)
+    assert apply_update(out, x, gain, h @ p, 0.01, ALL_FREE)
     np.testing.assert_allclose(out, expected, rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(x, moved, atol=1e-9)
 
@@ -49,7 +48,7 @@ def test_direct_observation_of_a_state(seed):
     expected = np.linalg.inv(np.linalg.inv(p) + np.outer(h, h) / noise)
     before = x[8]
     out = p.copy()
-    assert apply_direct(out, x, 8, p[8, 8] + noise, 2.0, FREE, WIDE, True, True)
+    assert apply_direct(out, x, 8, p[8, 8] + noise, 2.0, ALL_FREE)
     np.testing.assert_allclose(out, expected, rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(x[8], before - 2.0 * p[8, 8] / (p[8, 8] + noise))
 
@@ -58,7 +57,7 @@ def test_a_pair_uses_the_innovations_from_before_the_first():
     p, x = covariance(6), state(6)
     before, out = x.copy(), p.copy()
     variance = np.array((p[7, 7] + 0.4, p[8, 8] + 0.6))
-    assert apply_pair(out, x, 7, *variance, 0.5, -0.2, FREE, WIDE, True, True) == 0
+    assert apply_pair(out, x, 7, *variance, 0.5, -0.2, ALL_FREE) == 0
     first = p - np.outer(p[:, 7], p[7]) / variance[0]
     second = first - np.outer(first[:, 8], first[8]) / variance[1]
     np.testing.assert_allclose(out, second, rtol=1e-9, atol=1e-12)
@@ -71,23 +70,23 @@ def test_a_pair_tells_which_observation_was_unhealthy(bad, word):
     p, x = covariance(6), state(6)
     variance = {7: p[7, 7] + 0.4, 8: p[8, 8] + 0.6}
     variance[bad] = 0.5 * p[bad, bad]
-    assert apply_pair(p, x, 7, variance[7], variance[8], 0.1, 0.1, FREE, WIDE, True, True) == word
+    assert apply_pair(p, x, 7, variance[7], variance[8], 0.1, 0.1, ALL_FREE) == word
 
 
 def test_an_update_that_would_make_a_variance_negative_is_refused():
     p, x = covariance(2), state(2)
     before, gain = x.copy(), np.zeros(24)
     gain[5] = 3.0
-    assert not apply_update(p, x, gain, p[5].copy(), 1.0, FREE, WIDE, True, True)
+    assert not apply_update(p, x, gain, p[5].copy(), 1.0, ALL_FREE)
     np.testing.assert_array_equal(x, before)
     assert not p[5].any()
     assert not p[:, 5].any()
     assert p[6, 6] > 0.0
 
 
-def limited(p, inhibited=FREE, bias_max=WIDE, mag=True, wind=True):
+def limited(p, inhibited=(0.0, 0.0, 0.0), bias_max=1.0, mag=True, wind=True):
     out = p.copy()
-    limit_covariance(out, np.array(inhibited), bias_max, mag, wind)
+    limit_covariance(out, np.array((*inhibited, mag, wind, bias_max), dtype=float))
     return out
 
 
