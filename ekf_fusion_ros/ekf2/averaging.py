@@ -28,10 +28,15 @@ class SampleAverage:
         Stamps are averaged in whole milliseconds; half a filter period is taken off because the
         sample belongs to the middle of the period that the horizon crosses.
         """
+        due = time_us - self._accepted_us > min_interval_us
+        if due and self._count == 0:
+            # mostly a sensor is no faster than its buffer: one sample is its own mean
+            self._accepted_us = time_us
+            return 1000 * (time_us // 1000) - delay_us - FILTER_PERIOD_US // 2, value
         self._sum += value
         self._milliseconds += time_us // 1000
         self._count += 1
-        if time_us - self._accepted_us <= min_interval_us:
+        if not due:
             return None
         mean = self._sum / self._count
         stamp = 1000 * (self._milliseconds // self._count)

@@ -61,14 +61,13 @@ class Control:
         mag_popped = self.mag.pop()
         self.baro.pop()
         vision_popped = self.vision.pop()
-        healthy = self.checks.healthy
 
         self.height.check_health()
         self.mag.step(mag_popped)
         self.gnss.step(gnss_popped)
         self.height.step(gnss_popped, vision_popped)
-        self.vision.step(vision_popped, healthy, self.gnss.vision_yaw_forbidden)
-        self.fake_position.step(healthy)
+        self.vision.step(vision_popped, self.checks, self.gnss.vision_yaw_forbidden)
+        self.fake_position.step(self.checks)
         self.validity.step()
         if self.heading.covariance_lost:
             self.heading.covariance_lost = False
@@ -114,7 +113,7 @@ class Control:
     def _step_bank(self, gnss_popped: bool) -> None:
         f = self._f
         airspeed = f.params.yaw_estimator.default_airspeed if f.flags.fixed_wing else 0.0
-        self.bank.step(f.imu.increments, f.flags.in_air, airspeed, f.x[10:13], f.dt_avg)
+        self.bank.step(f.imu.increments, f.flags.in_air, airspeed, f.x, f.dt_avg)
         fix = f.fix
         if gnss_popped and fix is not None and fix.has_velocity and fix.vacc > 0.0:
             self.bank.set_velocity(fix.velocity, fix.vacc)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.state import FILTER_PERIOD
 from ekf_fusion_ros.ekf2.state import SIZE
+from ekf_fusion_ros.kernels.heading import apply_yaw
 from ekf_fusion_ros.kernels.magnetic import fuse_field
 from ekf_fusion_ros.kernels.prediction import GRAVITY
 from ekf_fusion_ros.kernels.prediction import PROCESS
@@ -129,6 +130,13 @@ class Covariance:
     def fuse(self, x: Array, gain: Array, hp: Array, innovation: float) -> bool:
         """Correct with a gain (24,) and H P (24,); False on a numerical fault."""
         healthy: bool = apply_update(self.p, x, gain, hp, innovation, self.limits)
+        return healthy
+
+    def fuse_yaw(
+        self, x: Array, jacobian: Array, gain: Array, variance: float, innovation: float,
+    ) -> bool:
+        """Correct with a yaw; see kernels.heading.apply_yaw."""
+        healthy: bool = apply_yaw(self.p, x, jacobian, gain, variance, innovation, self.limits)
         return healthy
 
     def fuse_pair(

@@ -39,7 +39,7 @@ def _judge_pair(
     noise: Sequence[float], gate: float,
 ) -> bool:
     p = f.cov.p
-    variance = (p[first, first] + noise[0], p[first + 1, first + 1] + noise[1])
+    variance = (p.item(first, first) + noise[0], p.item(first + 1, first + 1) + noise[1])
     ratio = max(test_ratio(innovation[0], variance[0], gate),
                 test_ratio(innovation[1], variance[1], gate))
     record.record(f.t_now, innovation, variance, ratio)
@@ -85,7 +85,7 @@ def fuse_horizontal_position(
 def _judge_down(
     f: Filter, record: Observation, state: int, innovation: float, noise: float, gate: float,
 ) -> VerticalCheck:
-    variance = f.cov.p[state, state] + noise
+    variance = f.cov.p.item(state, state) + noise
     record.record(f.t_now, (innovation,), (variance,), test_ratio(innovation, variance, gate))
     return VerticalCheck(innovation / math.sqrt(variance), f.t_now)
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.state import SECOND
+from ekf_fusion_ros.kernels.heading import compare_headings
 from ekf_fusion_ros.kernels.heading import level_heading
 from ekf_fusion_ros.kernels.heading import observe_yaw
 from ekf_fusion_ros.kernels.heading import refresh_yaw
@@ -32,14 +33,23 @@ class HeadingFusion:
         self.last_static_yaw = 0.0
         self.covariance_lost = False
         self._jacobian = np.zeros(4)
+        self._gain = np.zeros(24)
 
     def predicted_yaw(self) -> float:
         """Renew the cached rotation and return its yaw by the better sequence, rad."""
-        return float(refresh_yaw(self._f.x[0:4], self._f.rot))
+        yaw: float = refresh_yaw(self._f.x, self._f.rot)
+        return yaw
 
     def fuse_measured(self, measured: float, noise: float) -> None:
         """Fuse a yaw in rad with a variance in rad^2."""
-        predicted = self.predicted_yaw()
+        self._fuse_against(self.predicted_yaw(), measured, noise)
+
+    def fuse_magnetic(self, field: Array, declination: float, noise: float) -> None:
+        """Fuse the yaw that a field (3,) in body axes implies; noise in rad^2."""
+        predicted, magnetic = compare_headings(self._f.x, self._f.rot, field)
+        self._fuse_against(predicted, magnetic + declination, noise)
+
+    def _fuse_against(self, predicted: float, measured: float, noise: float) -> None:
         self.last_static_yaw = predicted
         self._fuse(wrap_pi(predicted - measured), noise)
 
@@ -66,8 +76,7 @@ class HeadingFusion:
     def _fuse(self, innovation: float, noise: float) -> None:
         f = self._f
         noise = max(noise, YAW_NOISE_FLOOR)
-        gain = np.empty(24)
-        known = observe_yaw(f.x[0:4], f.rot, f.cov.p, self._jacobian, gain)
+        known: float = observe_yaw(f.x, f.rot, f.cov.p, self._jacobian, self._gain)
         if math.isnan(known):
             return
         f.faults.heading = known < 0.0
@@ -75,15 +84,11 @@ class HeadingFusion:
             self.covariance_lost = True
             return
         variance = known + noise
-        gain /= variance
-        gain[16:22] = 0.0
-        if not f.flags.wind:
-            gain[22:24] = 0.0
         innovation = self._gate(innovation, variance)
         if math.isnan(innovation):
             return
-        hp = self._jacobian @ f.cov.p[0:4, :]
-        f.faults.heading = not f.cov.fuse(f.x, gain, hp, innovation)
+        f.faults.heading = not f.cov.fuse_yaw(f.x, self._jacobian, self._gain, variance,
+                                              innovation)
 
     def _gate(self, innovation: float, variance: float) -> float:
         """Return the innovation to fuse, clipped on the ground; NaN where it is rejected."""

@@ -9,6 +9,7 @@ from ekf_fusion_ros.ekf2.aid_sources.gnss import VERTICAL_NOISE_RATIO
 from ekf_fusion_ros.ekf2.aid_sources.gnss import Gnss
 from ekf_fusion_ros.ekf2.aid_sources.vision import Vision
 from ekf_fusion_ros.ekf2.events import EventKind
+from ekf_fusion_ros.ekf2.filter import NO_CLIPPING
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.fusion import fuse_vertical_position
 from ekf_fusion_ros.ekf2.gnss_checks import GnssChecks
@@ -66,8 +67,9 @@ class Height:
         """Bad: two independent vertical sensors, or one while clipping, see the filter falling."""
         f = self._f
         velocity, position = f.ver_vel_check, f.ver_pos_check
+        suspicious = velocity.ratio > RATIO_LIMIT or position.ratio > RATIO_LIMIT
         falling = independent = False
-        if f.recent(position.time_us, SECOND):
+        if suspicious and f.recent(position.time_us, SECOND):
             if f.recent(velocity.time_us, SECOND):
                 flags = f.flags
                 same_sensor = ((flags.gps_hgt and flags.gps)
@@ -77,7 +79,8 @@ class Height:
                            or (position.ratio > RATIO_LIMIT and velocity.ratio > 0.0))
             else:
                 falling = position.ratio > RATIO_LIMIT
-        self._count_clips()
+        if self._clips or f.imu.clipping != NO_CLIPPING:
+            self._count_clips()
         bad = (independent or self._clips > 0) and falling
         if bad:
             self._time_bad_us = f.t_now

@@ -5,6 +5,8 @@ from __future__ import annotations
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.state import PD
 from ekf_fusion_ros.ekf2.state import SECOND
+from ekf_fusion_ros.ekf2.state import VE
+from ekf_fusion_ros.ekf2.state import VN
 
 VARIANCE_MAX = 1e4
 VALID_US = 5 * SECOND
@@ -39,20 +41,21 @@ class Terrain:
     def step(self) -> None:
         """Run once per filter period, after all fusion."""
         f = self._f
+        down = f.x.item(PD)
         if not f.flags.in_air:
-            self._last_on_ground_down = float(f.x[PD])
+            self._last_on_ground_down = down
             clearance = f.params.terrain.ground_clearance
             self.down = self._last_on_ground_down + clearance
             self.variance = clearance ** 2
             f.times.hagl = f.t_now
         else:
-            dt = float(f.imu.increments[7])
+            dt = f.imu.increments.item(7)
             params = f.params.terrain
-            speed_squared = float(f.x[4] ** 2 + f.x[5] ** 2)
+            speed_squared = f.x.item(VN) ** 2 + f.x.item(VE) ** 2
             growth = ((dt * params.process_noise) ** 2
                       + (dt * params.gradient) ** 2 * speed_squared)
             self.variance = min(max(self.variance + growth, 0.0), VARIANCE_MAX)
-        highest = float(f.x[PD]) + f.params.terrain.ground_clearance
+        highest = down + f.params.terrain.ground_clearance
         self.down = max(self.down, highest)
 
     @property

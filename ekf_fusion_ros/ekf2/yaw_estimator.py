@@ -55,11 +55,11 @@ class YawEstimator:
         self._velocity = velocity[0:2].copy()
         self._accuracy = accuracy
 
-    def step(self, imu: Array, airborne: bool, airspeed: float, bias: Array, dt: float) -> None:
+    def step(self, imu: Array, airborne: bool, airspeed: float, x: Array, dt: float) -> None:
         """Advance by one filter period.
 
-        imu (8,) raw increments; airspeed m/s, 0 = unknown; bias (3,) rad per period of dt s of the
-        main filter, with which the references start.
+        imu (8,) raw increments; airspeed m/s, 0 = unknown; x (24,) the state of the main filter,
+        with whose gyro bias, per period of dt s, the references start.
         """
         velocity, self._velocity = self._velocity, None
         if not self._tilt_aligned:
@@ -70,7 +70,7 @@ class YawEstimator:
         if not airborne:
             self.running = False
         elif velocity is not None:
-            self._use(velocity, bias / dt)
+            self._use(velocity, x[10:13] / dt)
             if self.running:
                 combine_models(self.state, self.cov, self.weights, self._composite)
 

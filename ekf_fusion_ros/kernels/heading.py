@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.kernels.compile import kernel
+from ekf_fusion_ros.kernels.update import WIND_ACTIVE
+from ekf_fusion_ros.kernels.update import apply_update
 from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
 
 Array = NDArray[np.float64]
@@ -20,9 +22,9 @@ SINGULAR = 1e-6
 
 
 @kernel
-def refresh_yaw(q: Array, rot: Array) -> float:
-    """Write R(q) into rot (3, 3) and return its yaw in rad."""
-    rot[:, :] = matrix_from_quat(q)
+def refresh_yaw(x: Array, rot: Array) -> float:
+    """Write R(q) of a state x (24,) into rot (3, 3) and return its yaw in rad."""
+    rot[:, :] = matrix_from_quat(x)
     if abs(rot[2, 0]) < abs(rot[2, 1]):
         return math.atan2(rot[1, 0], rot[0, 0])
     return math.atan2(-rot[0, 1], rot[1, 1])
@@ -50,15 +52,37 @@ def yaw_gradient(q: Array, sequence_321: bool, jacobian: Array) -> bool:
 
 
 @kernel
-def observe_yaw(q: Array, rot: Array, p: Array, jacobian: Array, gain: Array) -> float:
+def observe_yaw(x: Array, rot: Array, p: Array, jacobian: Array, gain: Array) -> float:
     """Fill jacobian (4,) and P H' (24,); return H P H' in rad^2, NaN at the singularity."""
-    if not yaw_gradient(q, abs(rot[2, 0]) < abs(rot[2, 1]), jacobian):
+    if not yaw_gradient(x, abs(rot[2, 0]) < abs(rot[2, 1]), jacobian):
         return math.nan
     for i in range(24):
         gain[i] = (p[i, 0] * jacobian[0] + p[i, 1] * jacobian[1] + p[i, 2] * jacobian[2]
                    + p[i, 3] * jacobian[3])
     return float(jacobian[0] * gain[0] + jacobian[1] * gain[1] + jacobian[2] * gain[2]
                  + jacobian[3] * gain[3])
+
+
+@kernel
+def apply_yaw(
+    p: Array, x: Array, jacobian: Array, gain: Array, variance: float, innovation: float,
+    limits: Array,
+) -> bool:
+    """Correct with what observe_yaw has found and an innovation variance; False on a fault.
+
+    The gain of the magnetic field is cut, and that of the wind while it is not estimated.
+    """
+    last = 24 if limits[WIND_ACTIVE] != 0.0 else 22
+    for i in range(16):
+        gain[i] /= variance
+    gain[16:22] = 0.0
+    for i in range(22, 24):
+        gain[i] = gain[i] / variance if i < last else 0.0
+    hp = np.empty(24)
+    for i in range(24):
+        hp[i] = (jacobian[0] * p[0, i] + jacobian[1] * p[1, i] + jacobian[2] * p[2, i]
+                 + jacobian[3] * p[3, i])
+    return apply_update(p, x, gain, hp, innovation, limits)
 
 
 @kernel
@@ -75,3 +99,12 @@ def level_heading(rot: Array, field: Array) -> float:
     east = rot[1, 0] * field[0] + rot[1, 1] * field[1] + rot[1, 2] * field[2]
     c, s = math.cos(yaw), math.sin(yaw)
     return -math.atan2(c * east - s * north, c * north + s * east)
+
+
+@kernel
+def compare_headings(x: Array, rot: Array, field: Array) -> tuple[float, float]:
+    """Write R(q) of a state x (24,) into rot (3, 3); return its yaw and the magnetic one in rad.
+
+    field (3,) measured in body axes; the body field of the state is taken off.
+    """
+    return refresh_yaw(x, rot), level_heading(rot, field - x[19:22])

@@ -25,6 +25,13 @@ VANISHED = 1e-3
 
 
 @kernel
+def low_pass(value: Array, measured: Array, share: float) -> None:
+    """Move value (n,) by a share of its distance towards measured (n,), in place."""
+    for i in range(value.shape[0]):
+        value[i] = (1.0 - share) * value[i] + share * measured[i]
+
+
+@kernel
 def field_jacobian(x: Array, axis: int, h: Array) -> float:
     """Fill h (24,) with the gradient of one body axis and return its prediction, Gauss."""
     q0, v0, v1, v2 = x[0], x[1], x[2], x[3]

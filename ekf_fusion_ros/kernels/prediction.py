@@ -13,6 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ekf_fusion_ros.kernels.compile import COMPILED
 from ekf_fusion_ros.kernels.compile import kernel
 from ekf_fusion_ros.kernels.update import ACCEL_BIAS_VARIANCE_MAX
 from ekf_fusion_ros.kernels.update import MAG_ACTIVE
@@ -198,6 +199,46 @@ def _add_input_noise(block: Array, f: Array, angle_var: float, velocity_var: Arr
 
 
 @kernel
+def _propagate_by_element(f: Array, p: Array) -> tuple[Array, Array]:
+    top = np.empty((10, 24))
+    for i in range(4):
+        for j in range(24):
+            top[i, j] = (f[i, 0] * p[0, j] + f[i, 1] * p[1, j] + f[i, 2] * p[2, j]
+                         + f[i, 3] * p[3, j] + f[i, 10] * p[10, j] + f[i, 11] * p[11, j]
+                         + f[i, 12] * p[12, j])
+    for i in range(4, 7):
+        for j in range(24):
+            top[i, j] = (p[i, j] + f[i, 0] * p[0, j] + f[i, 1] * p[1, j] + f[i, 2] * p[2, j]
+                         + f[i, 3] * p[3, j] + f[i, 13] * p[13, j] + f[i, 14] * p[14, j]
+                         + f[i, 15] * p[15, j])
+    for i in range(7, 10):
+        for j in range(24):
+            top[i, j] = p[i, j] + f[i, i - 3] * p[i - 3, j]
+    block = np.empty((10, 10))
+    for i in range(10):
+        for j in range(4):
+            block[i, j] = (top[i, 0] * f[j, 0] + top[i, 1] * f[j, 1] + top[i, 2] * f[j, 2]
+                           + top[i, 3] * f[j, 3] + top[i, 10] * f[j, 10] + top[i, 11] * f[j, 11]
+                           + top[i, 12] * f[j, 12])
+        for j in range(4, 7):
+            block[i, j] = (top[i, j] + top[i, 0] * f[j, 0] + top[i, 1] * f[j, 1]
+                           + top[i, 2] * f[j, 2] + top[i, 3] * f[j, 3] + top[i, 13] * f[j, 13]
+                           + top[i, 14] * f[j, 14] + top[i, 15] * f[j, 15])
+        for j in range(7, 10):
+            block[i, j] = top[i, j] + top[i, j - 3] * f[j, j - 3]
+    return top, block
+
+
+def _propagate_as_arrays(f: Array, p: Array) -> tuple[Array, Array]:
+    top = f @ p
+    return top, top @ f.T
+
+
+propagate = _propagate_by_element if COMPILED else _propagate_as_arrays
+"""F P (10, 24) and F P F' (10, 10) of f (10, 24), with and without the zeros of F."""
+
+
+@kernel
 def advance_covariance(
     p: Array, x: Array, imu: Array, limits: Array, process: NDArray[np.void], dt_avg: float,
 ) -> None:
@@ -222,6 +263,7 @@ def advance_covariance(
     if s['yaw_drift_var'] > 0.0:
         add_yaw_variance(p, x, s['yaw_drift_var'])
     limits[ACCEL_BIAS_VARIANCE_MAX] = (0.1 * GRAVITY * dt_avg) ** 2
+    p[0:10, 0:10] = 0.5 * (p[0:10, 0:10] + p[0:10, 0:10].T)
     limit_covariance(p, limits)
 
 
@@ -248,8 +290,7 @@ def predict_covariance(
     """
     fill_transition(x[0:4], imu[0:3] - x[10:13], imu[3:6] - x[13:16], NOMINAL_PERIOD, f)
     frozen = p[7, 7] + p[8, 8] > POSITION_LOST_VARIANCE
-    top = f @ p
-    block = top @ f.T
+    top, block = propagate(f, p)
     _add_input_noise(block, f, angle_var, velocity_var)
     kept = p[7:9, :].copy()
     p[0:10, 10:24] = top[:, 10:24]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ekf_fusion_ros.kernels.compile import COMPILED
 from ekf_fusion_ros.kernels.compile import kernel
 from ekf_fusion_ros.mathlib.rotation import quat_normalise
 
@@ -28,15 +29,41 @@ ACCEL_BIAS_VARIANCE_SAFE = 1e-9
 
 
 @kernel
+def _subtract_by_element(p: Array, gain: Array, hp: Array) -> bool:
+    for i in range(24):
+        if p[i, i] < gain[i] * hp[i]:
+            return False
+    for i in range(24):
+        for j in range(i):
+            mean = 0.5 * ((p[i, j] - gain[i] * hp[j]) + (p[j, i] - gain[j] * hp[i]))
+            p[i, j] = mean
+            p[j, i] = mean
+        p[i, i] -= gain[i] * hp[i]
+    return True
+
+
+def _subtract_as_arrays(p: Array, gain: Array, hp: Array) -> bool:
+    khp = np.outer(gain, hp)
+    if np.any(np.diagonal(p) < np.diagonal(khp)):
+        return False
+    np.subtract(p, 0.5 * (khp + khp.T), out=p)
+    return True
+
+
+subtract = _subtract_by_element if COMPILED else _subtract_as_arrays
+"""P <- P - K H P with the halves averaged, for gain (24,) and H P (24,), where P is symmetric;
+False, and nothing done, where a variance would turn negative."""
+
+
+@kernel
 def limit_covariance(p: Array, limits: Array) -> None:
-    """Clamp the variances, make P symmetric, keep inactive blocks at zero, in place.
+    """Clamp the variances of a symmetric P and keep inactive blocks at zero, in place.
 
     The accelerometer-bias variances are kept within a ratio of 100; one that has collapsed
     decorrelates all three.
     """
     diagonal = p.reshape(576)[::25]
     diagonal[0:13] = np.minimum(np.maximum(diagonal[0:13], VARIANCE_MIN), VARIANCE_MAX)
-    p[:, :] = 0.5 * (p + p.T)
     largest = ACCEL_BIAS_VARIANCE_SAFE
     collapsed = False
     free = 0
@@ -83,19 +110,12 @@ def apply_update(
     gain (24,) may have been cut by the caller; hp (24,) = H P. On failure the rows of the states
     that would turn negative are zeroed and nothing else is changed.
     """
-    khp = np.outer(gain, hp)
-    drop = khp.reshape(576)[::25]
-    diagonal = p.reshape(576)[::25]
-    healthy = True
-    if np.any(diagonal < drop):
+    if not subtract(p, gain, hp):
         for i in range(24):
-            if p[i, i] < khp[i, i]:
+            if p[i, i] < gain[i] * hp[i]:
                 p[i, :] = 0.0
                 p[:, i] = 0.0
-                healthy = False
-    if not healthy:
         return False
-    p -= khp
     limit_covariance(p, limits)
     x -= gain * innovation
     x[0:4] = quat_normalise(x[0:4])

@@ -22,7 +22,7 @@ def push_forward(yaw, seconds, noise=0.0, seed=0):
         forward = 0.0 if begin else 3.0 * math.cos(2.0 * math.pi * (k * DT - 1.0) / 5.0)
         speed += forward * DT
         imu = np.concatenate([np.zeros(3), np.array((forward, 0.0, -GRAVITY)) * DT, [DT, DT]])
-        bank.step(imu, not begin, 0.0, np.zeros(3), DT)
+        bank.step(imu, not begin, 0.0, np.zeros(24), DT)
         if k % 20 == 0:
             measured = speed * nose + noise * rng.normal(size=2)
             bank.set_velocity(measured, max(noise, 0.1))
@@ -51,7 +51,7 @@ def test_without_motion_nothing_is_known():
     bank = YawEstimator()
     at_rest = np.concatenate([np.zeros(3), (0.0, 0.0, -GRAVITY * DT), [DT, DT]])
     for k in range(1000):
-        bank.step(at_rest, True, 0.0, np.zeros(3), DT)
+        bank.step(at_rest, True, 0.0, np.zeros(24), DT)
         if k % 20 == 0:
             bank.set_velocity(np.zeros(2), 0.3)
     assert bank.running
@@ -63,7 +63,7 @@ def test_it_waits_on_the_ground():
     at_rest = np.concatenate([np.zeros(3), (0.0, 0.0, -GRAVITY * DT), [DT, DT]])
     for _ in range(100):
         bank.set_velocity(np.zeros(2), 0.3)
-        bank.step(at_rest, False, 0.0, np.zeros(3), DT)
+        bank.step(at_rest, False, 0.0, np.zeros(24), DT)
     assert not bank.running
 
 
@@ -75,7 +75,7 @@ def test_tilt_at_the_start_is_that_of_gravity(pitch, roll):
     tilt[np.abs(tilt) < 1e-15] = 0.0
     bank = YawEstimator()
     force = tilt.T @ np.array((0.0, 0.0, -GRAVITY))
-    bank.step(np.concatenate([np.zeros(3), force * DT, [DT, DT]]), False, 0.0, np.zeros(3), DT)
+    bank.step(np.concatenate([np.zeros(3), force * DT, [DT, DT]]), False, 0.0, np.zeros(24), DT)
     for rot in bank.rot:
         np.testing.assert_allclose(rot[2], tilt[2], atol=1e-12)
         np.testing.assert_allclose(rot @ rot.T, np.eye(3), atol=1e-12)

@@ -95,12 +95,15 @@ def test_a_sound_covariance_passes_unchanged():
     np.testing.assert_allclose(limited(p), p, rtol=1e-15)
 
 
-def test_halves_are_averaged():
-    p = covariance(1)
-    p[4, 7] += 2e-3
-    out = limited(p)
+def test_halves_are_averaged_where_a_gain_is_cut():
+    p, x = covariance(1), state(1)
+    hp, gain = p[8].copy(), p[:, 8] / (p[8, 8] + 0.3)
+    gain[16:24] = 0.0
+    whole = p - np.outer(gain, hp)
+    out = p.copy()
+    assert apply_update(out, x, gain, hp, 0.1, ALL_FREE)
     np.testing.assert_array_equal(out, out.T)
-    np.testing.assert_allclose(out[4, 7], p[7, 4] + 1e-3)
+    np.testing.assert_allclose(out, 0.5 * (whole + whole.T), rtol=1e-12, atol=1e-15)
 
 
 def test_variances_are_clamped():

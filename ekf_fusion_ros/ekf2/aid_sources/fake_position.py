@@ -5,6 +5,7 @@ from __future__ import annotations
 from ekf_fusion_ros.ekf2.events import EventKind
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.fusion import fuse_horizontal_position
+from ekf_fusion_ros.ekf2.gnss_checks import GnssChecks
 from ekf_fusion_ros.ekf2.resets import Resets
 
 INTERVAL_US = 200_000
@@ -24,14 +25,14 @@ class FakePosition:
         self._resets = resets
         self._fused_us = 0
 
-    def step(self, gnss_healthy: bool) -> None:
+    def step(self, checks: GnssChecks) -> None:
         """Run once per filter period, after all aid sources."""
         f = self._f
         f.holding_position = not f.flags.aided_horizontally()
         if not f.holding_position or not f.late(self._fused_us, INTERVAL_US):
             return
         if f.late(self._fused_us, REENTRY_US):
-            self._enter(gnss_healthy)
+            self._enter(checks.healthy)
         self._fused_us = f.t_now
         self._fuse()
 

@@ -22,6 +22,7 @@ from ekf_fusion_ros.ekf2.resets import Resets
 from ekf_fusion_ros.ekf2.state import FILTER_PERIOD
 from ekf_fusion_ros.ekf2.state import SECOND
 from ekf_fusion_ros.ekf2.terrain import Terrain
+from ekf_fusion_ros.kernels.magnetic import low_pass
 from ekf_fusion_ros.samples import MagSample
 
 Array = NDArray[np.float64]
@@ -91,7 +92,7 @@ class Magnetometer:
             return False
         measured = popped[1]
         if self.count:
-            self.lpf = (1.0 - LPF_SHARE) * self.lpf + LPF_SHARE * measured
+            low_pass(self.lpf, measured, LPF_SHARE)
         else:
             self.lpf = measured.copy()
         self.count += 1
@@ -248,9 +249,8 @@ class Magnetometer:
     def _fuse_heading(self) -> None:
         f = self._f
         noise = f.params.mag.heading_noise ** 2
+        if not self._inhibited:
+            self._heading.fuse_magnetic(self.field, declination(f), noise)
+            return
         self._heading.predicted_yaw()
-        yaw = mag_yaw(f, self.field - f.x[19:22], declination(f))
-        if self._inhibited:
-            self._heading.hold(yaw, noise)
-        else:
-            self._heading.fuse_measured(yaw, noise)
+        self._heading.hold(mag_yaw(f, self.field - f.x[19:22], declination(f)), noise)

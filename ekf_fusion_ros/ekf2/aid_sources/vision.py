@@ -14,6 +14,7 @@ from ekf_fusion_ros.ekf2.aid_sources.vision_velocity import VisionVelocity
 from ekf_fusion_ros.ekf2.aid_sources.vision_yaw import VisionYaw
 from ekf_fusion_ros.ekf2.events import EventKind
 from ekf_fusion_ros.ekf2.filter import Filter
+from ekf_fusion_ros.ekf2.gnss_checks import GnssChecks
 from ekf_fusion_ros.ekf2.heading import HeadingFusion
 from ekf_fusion_ros.ekf2.resets import Resets
 from ekf_fusion_ros.ekf2.state import FILTER_PERIOD_US
@@ -57,13 +58,13 @@ class Vision:
         self.delayed_us, self._f.vision = popped
         return True
 
-    def step(self, popped: bool, gnss_healthy: bool, yaw_forbidden: bool) -> None:
+    def step(self, popped: bool, checks: GnssChecks, yaw_forbidden: bool) -> None:
         """Run once per filter period."""
         f = self._f
         if f.flags.ev_pos:
             self.position.travel()
         if popped:
-            self._use(gnss_healthy, yaw_forbidden)
+            self._use(checks.healthy, yaw_forbidden)
             return
         flags = f.flags
         active = flags.ev_pos or flags.ev_vel or flags.ev_yaw
