@@ -149,11 +149,13 @@ class Covariance:
 
     def fuse_field(
         self, x: Array, innovation: Array, axes: int, noise: float, all_states: bool,
-        declination: float, shortest: float, variance: Array, outcome: Array,
-    ) -> None:
+        declination: float, shortest: float, variance: Array,
+    ) -> tuple[int, int, int]:
         """Correct with the first magnetometer axes; see kernels.magnetic.fuse_field."""
-        fuse_field(x, self.p, innovation, axes, noise, all_states, declination, shortest,
-                   self.limits, variance, outcome)
+        outcome: tuple[int, int, int] = fuse_field(
+            x, self.p, innovation, axes, noise, all_states, declination, shortest, self.limits,
+            variance)
+        return outcome
 
     def decorrelate(self, first: int, size: int) -> None:
         """Remove all correlations of states first .. first + size - 1, keeping variances."""

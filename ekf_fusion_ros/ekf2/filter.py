@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -125,8 +126,8 @@ class Filter:
         self.fix: GnssFix | None = None
         self.vision: VisionSample | None = None
         self.rot_ev: Array = np.eye(3)
-        self.last_velocity = np.zeros(2)
-        self.last_velocity_variance = np.zeros(2)
+        self.last_velocity: Sequence[float] = (0.0, 0.0)
+        self.last_velocity_variance: Sequence[float] = (0.0, 0.0)
         self.holding_position = False
         self.dead_reckoning = True
         self.last_aiding_us = 0

@@ -34,6 +34,7 @@ class InertialInput:
         self.started = False
         self.last_us = 0
         self.min_interval_us = 0
+        self.at_rest = False
         self._last_move_us = 0
         self._last_vibration_us = 0
         self._state = np.zeros(1, INERTIAL)
@@ -60,6 +61,7 @@ class InertialInput:
             self._last_vibration_us = self._last_move_us = time_us
         elif in_air:
             self._last_move_us = time_us
+        self.at_rest = time_us - self._last_move_us > REST_TIME_US
         if sample.clipping != NO_CLIPPING:
             x, y, z = (bool(a or b) for a, b in zip(self._clipping, sample.clipping, strict=True))
             self._clipping = (x, y, z)
@@ -75,11 +77,6 @@ class InertialInput:
     def quiet(self) -> bool:
         """True where neither vibration nor rotation has shown for a while."""
         return self.last_us - self._last_vibration_us > REST_TIME_US
-
-    @property
-    def at_rest(self) -> bool:
-        """True where the vehicle is on the ground and quiet for a while."""
-        return self.last_us - self._last_move_us > REST_TIME_US
 
 
 def buffer_lengths(

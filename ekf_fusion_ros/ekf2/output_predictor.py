@@ -35,6 +35,7 @@ class OutputPredictor:
         self.yaw: Array = output['yaw']
         self.tracking_error: Array = output['tracking_error']
         self._history = np.zeros((history, 10))
+        self._size = history
         self._pushed = 0
 
     def align(self, x: Array) -> None:
@@ -49,14 +50,13 @@ class OutputPredictor:
 
     def correct(self, x: Array, delay: float, dt_imu_avg: float, dt_avg: float) -> None:
         """Compare with the filter state (24,) that lies `delay` s in the past."""
-        size = len(self._history)
-        newest = self._pushed % size
+        pushed, size = self._pushed, self._size
         self._pushed += 1
-        oldest = self._pushed % size if self._pushed >= size else 0
-        correct_predictor(self._output, self._history, newest, oldest, x,
+        oldest = (pushed + 1) % size if pushed + 1 >= size else 0
+        correct_predictor(self._output, self._history, pushed % size, oldest, x,
                           0.5 * dt_imu_avg / max(delay, dt_imu_avg),
-                          dt_avg / min(max(self._params.vel_tau, dt_avg), 10.0),
-                          dt_avg / min(max(self._params.pos_tau, dt_avg), 10.0))
+                          dt_avg / max(self._params.vel_tau, dt_avg),
+                          dt_avg / max(self._params.pos_tau, dt_avg))
 
     def velocity_at_origin(self, imu_position: Array) -> Array:
         """Return the velocity (3,) of the body origin, given the IMU position (3,) in the body."""

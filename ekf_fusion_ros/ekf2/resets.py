@@ -11,6 +11,8 @@ from ekf_fusion_ros.ekf2.state import PD
 from ekf_fusion_ros.ekf2.state import PN
 from ekf_fusion_ros.ekf2.state import VD
 from ekf_fusion_ros.ekf2.state import VN
+from ekf_fusion_ros.kernels.vision import Three
+from ekf_fusion_ros.kernels.vision import turn_velocity
 from ekf_fusion_ros.mathlib.rotation import cross
 from ekf_fusion_ros.mathlib.rotation import quat_from_matrix
 from ekf_fusion_ros.mathlib.rotation import quat_inverse
@@ -27,6 +29,7 @@ UNKNOWN_VELOCITY_VARIANCE = 25.0
 UNKNOWN_CLIMB_VARIANCE = 10.0
 
 DIFFUSE = 100.0
+LEVEL = np.eye(3)
 
 
 class ResetCounters:
@@ -144,8 +147,8 @@ class Resets:
             self.velocity_to_fix()
         elif f.flags.ev_vel and f.vision is not None and f.vision.has_velocity:
             f.events.add(f.t_now, EventKind.VEL_RESET_VISION)
-            velocity, covariance = vision_velocity_in_filter_frame(f, f.vision)
-            variance = covariance.diagonal()
+            turned, spread = vision_velocity_in_filter_frame(f, f.vision)
+            velocity, variance = np.array(turned), np.array(spread)
             if f.params.vision.velocity_tells_attitude:
                 # Its direction hangs on the attitude; the fusion that follows makes that known.
                 variance = variance + DIFFUSE * (1.0 + float(velocity @ velocity))
@@ -192,16 +195,17 @@ class Resets:
         self.horizontal_position(f.fix.position, np.full(2, f.fix.hacc ** 2))
 
 
-def vision_velocity_in_filter_frame(f: Filter, sample: VisionSample) -> tuple[Array, Array]:
-    """Return velocity (3,) and covariance (3, 3) of a vision sample in NED, at the IMU.
+def vision_velocity_in_filter_frame(f: Filter, sample: VisionSample) -> tuple[Three, Three]:
+    """Return velocity in m/s NED at the IMU, and its variances, of a vision sample.
 
     Removes the lever arm of the sensor with the delayed rate.
     """
-    swing = np.zeros(3) if f.vision_lever is None else cross(f.rate, f.vision_lever)
     if sample.velocity_frame is VelocityFrame.BODY_FRD:
-        return (f.rot @ (sample.velocity - swing),
-                f.rot @ sample.velocity_cov @ f.rot.T)
-    if f.params.vision.rotate:
-        return (f.rot_ev @ sample.velocity - f.rot @ swing,
-                f.rot_ev @ sample.velocity_cov @ f.rot_ev.T)
-    return sample.velocity - f.rot @ swing, sample.velocity_cov
+        turn = f.rot
+    else:
+        turn = f.rot_ev if f.params.vision.rotate else LEVEL
+    velocity, variance = turn_velocity(turn, sample.velocity, sample.velocity_cov)
+    if f.vision_lever is not None:
+        swing = f.rot @ cross(f.rate, f.vision_lever)
+        velocity = tuple((velocity - swing).tolist())
+    return velocity, variance

@@ -83,10 +83,10 @@ class YawRecovery:
         """Compare the course of the last velocity observation with that of the state."""
         f = self._f
         observed, noise = f.last_velocity, f.last_velocity_variance
-        speed2 = float(observed @ observed)
+        speed2 = observed[0] ** 2 + observed[1] ** 2
         own2 = float(f.x[4] ** 2 + f.x[5] ** 2)
         own_noise = float(f.cov.p[4, 4] + f.cov.p[5, 5])
-        both_move = (speed2 > max(16.0 * float(noise[0] + noise[1]), MIN_SPEED_SQUARED)
+        both_move = (speed2 > max(16.0 * (noise[0] + noise[1]), MIN_SPEED_SQUARED)
                      and own2 > max(16.0 * own_noise, MIN_SPEED_SQUARED))
         if not both_move:
             return False

@@ -62,13 +62,15 @@ def field_jacobian(x: Array, axis: int, h: Array) -> float:
 
 @kernel
 def predict_field(
-    x: Array, p: Array, measured: Array, noise: float, innovation: Array, variance: Array,
-) -> None:
-    """Fill innovation (3,) in Gauss and its variance (3,) in Gauss^2."""
-    h = np.empty(24)
+    x: Array, p: Array, measured: Array, noise: float, innovation: Array,
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Fill innovation (3,) in Gauss; return it and its variance in Gauss^2."""
+    h, variance = np.empty(24), np.empty(3)
     for axis in range(3):
         innovation[axis] = field_jacobian(x, axis, h) - measured[axis]
         variance[axis] = np.dot(h, np.dot(p, h)) + noise
+    return ((innovation[0], innovation[1], innovation[2]),
+            (variance[0], variance[1], variance[2]))
 
 
 @kernel
@@ -124,20 +126,22 @@ def limit_field(x: Array, declination: float, shortest: float) -> None:
 @kernel
 def fuse_field(
     x: Array, p: Array, innovation: Array, axes: int, noise: float, all_states: bool,
-    declination: float, shortest: float, limits: Array, variance: Array, outcome: Array,
-) -> None:
+    declination: float, shortest: float, limits: Array, variance: Array,
+) -> tuple[int, int, int]:
     """Fuse the first axes one after the other, each with the Jacobian at the newest state.
 
-    outcome (3,) receives what fuse_field_axis returned; an innovation variance below the noise
-    ends the sequence.
+    Returns what fuse_field_axis said of each; an innovation variance below the noise ends the
+    sequence.
     """
+    outcome = np.zeros(3, np.int64)
     for axis in range(axes):
         outcome[axis] = fuse_field_axis(
             x, p, axis, innovation[axis], noise, all_states, limits, variance)
         if outcome[axis] == 1:
-            return
+            break
         if outcome[axis] == 0:
             limit_field(x, declination, shortest)
+    return outcome[0], outcome[1], outcome[2]
 
 
 @kernel

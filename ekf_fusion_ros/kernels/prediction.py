@@ -49,8 +49,8 @@ PROCESS = np.dtype([
     ('noise', 'f8', (24,)), ('saved', 'f8', (3,)), ('height_rate', 'f8'), ('wind_noise', 'f8'),
     ('position_drift_var', 'f8'), ('yaw_drift_var', 'f8')])
 """What the covariance prediction keeps and is told: scratch for F, noise of the increments in
-rad^2 and (m/s)^2, additive noise of the states, variances of frozen accelerometer biases, low-passed
-height rate in m/s, sigma of the wind and drift variances per period."""
+rad^2 and (m/s)^2, additive noise of the states, variances of frozen accelerometer biases, the
+low-passed height rate in m/s, sigma of the wind and drift variances per period."""
 
 
 @kernel

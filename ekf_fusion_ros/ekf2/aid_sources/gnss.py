@@ -281,8 +281,8 @@ class Gnss:
         position_innovation = (f.x[7:9] - fix.position).tolist()
         if fix.has_velocity:
             noise = fix.sacc ** 2
-            f.last_velocity = fix.velocity[0:2]
-            f.last_velocity_variance = np.full(2, noise)
+            f.last_velocity = fix.velocity[0:2].tolist()
+            f.last_velocity_variance = (noise, noise)
             fuse_horizontal_velocity(f, f.observations.gps_hor_vel, velocity_innovation[0:2],
                                      (noise, noise), params.vel_gate)
             fuse_vertical_velocity(f, f.observations.gps_ver_vel, velocity_innovation[2],

@@ -38,17 +38,15 @@ def fuse_three_axes(f: Filter, measured: Array, all_states: bool) -> bool:
     """Gate the three axes together and fuse them one by one; False where nothing was fused."""
     params = f.params.mag
     noise = max(params.noise, 1e-3) ** 2
-    innovation, variance = np.empty(3), np.empty(3)
-    predict_field(f.x, f.cov.p, measured, noise, innovation, variance)
+    innovation = np.empty(3)
+    innovations, variances = predict_field(f.x, f.cov.p, measured, noise, innovation)
     faults = f.faults
-    variances = variance.tolist()
     faults.mag_x, faults.mag_y, faults.mag_z = (s < noise for s in variances)
     if faults.mag_x or faults.mag_y or faults.mag_z:
         _restart_field_covariance(f)
         return False
     if f.flags.synthetic_mag_z:
-        innovation[2] = 0.0
-    innovations = innovation.tolist()
+        innovations = (*innovations[0:2], 0.0)
     ratios = [test_ratio(i, s, params.gate) for i, s in zip(innovations, variances, strict=True)]
     record = f.observations.mag
     record.record(f.t_now, innovations, variances, max(ratios))
@@ -60,12 +58,11 @@ def fuse_three_axes(f: Filter, measured: Array, all_states: bool) -> bool:
         record.reject()
         return False
     record.accept()
-    outcome = np.zeros(3)
-    f.cov.fuse_field(f.x, innovation, 2 if f.flags.synthetic_mag_z else 3, noise, all_states,
-                     table_declination(f), shortest_field(f), variance, outcome)
-    codes = outcome.tolist()
-    faults.mag_x, faults.mag_y, faults.mag_z = (code != 0.0 for code in codes)
-    if 1.0 in codes:
+    variance = np.array(variances)
+    outcome = f.cov.fuse_field(f.x, innovation, 2 if f.flags.synthetic_mag_z else 3, noise,
+                               all_states, table_declination(f), shortest_field(f), variance)
+    faults.mag_x, faults.mag_y, faults.mag_z = (code != 0 for code in outcome)
+    if 1 in outcome:
         _restart_field_covariance(f)
     record.variance[:] = variance.tolist()
     return True

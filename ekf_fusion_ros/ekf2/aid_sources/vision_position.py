@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +11,9 @@ from ekf_fusion_ros.ekf2.fusion import fuse_horizontal_position
 from ekf_fusion_ros.ekf2.fusion import fuse_horizontal_velocity
 from ekf_fusion_ros.ekf2.resets import Resets
 from ekf_fusion_ros.ekf2.state import SECOND
+from ekf_fusion_ros.ekf2.state import VE
+from ekf_fusion_ros.ekf2.state import VN
+from ekf_fusion_ros.kernels.vision import turn_displacement
 from ekf_fusion_ros.samples import VisionSample
 
 Array = NDArray[np.float64]
@@ -29,7 +30,7 @@ class VisionPosition:
         self._f = f
         self._resets = resets
         self._previous: VisionSample | None = None
-        self._travelled = np.zeros(2)
+        self._north = self._east = 0.0
         self._velocity_resets = 0
 
     def start(self) -> None:
@@ -73,7 +74,10 @@ class VisionPosition:
 
     def travel(self) -> None:
         """Add up the predicted displacement; once per filter period."""
-        self._travelled += self._f.x[4:6] * float(self._f.imu.increments[7])
+        f = self._f
+        dt = f.imu.increments.item(7)
+        self._north += f.x.item(VN) * dt
+        self._east += f.x.item(VE) * dt
 
     def _fuse_displacement(self, sample: VisionSample) -> None:
         """Fuse the mean velocity over the interval between two samples.
@@ -84,22 +88,19 @@ class VisionPosition:
         """
         f = self._f
         previous, self._previous = self._previous, sample
-        travelled, self._travelled = self._travelled, np.zeros(2)
+        north, east = self._north, self._east
+        self._north = self._east = 0.0
         velocity_resets = self._resets.counters.vel_ne
         jumped = velocity_resets != self._velocity_resets
         self._velocity_resets = velocity_resets
         if previous is None or jumped or sample.time_us <= previous.time_us:
             return
         interval = 1e-6 * (sample.time_us - previous.time_us)
-        displacement = sample.position - previous.position
-        spread = sample.position_var + previous.position_var
-        if not math.isfinite(displacement[2]):
-            # an unmeasured height must not reach x and y through the rotation
-            displacement[2] = spread[2] = 0.0
-        rows = f.rot_ev[0:2]
-        moved = rows @ displacement
-        noise = (rows * rows) @ spread / interval ** 2
-        fuse_horizontal_velocity(f, f.observations.ev_hor_pos,
-                                 ((travelled - moved) / interval).tolist(),
-                                 np.maximum(noise, NOISE_FLOOR).tolist(),
+        moved_north, moved_east, north_var, east_var = turn_displacement(
+            f.rot_ev, sample.position, sample.position_var, previous.position,
+            previous.position_var)
+        innovation = (north - moved_north) / interval, (east - moved_east) / interval
+        noise = (max(north_var / interval ** 2, NOISE_FLOOR),
+                 max(east_var / interval ** 2, NOISE_FLOOR))
+        fuse_horizontal_velocity(f, f.observations.ev_hor_pos, innovation, noise,
                                  f.params.vision.pos_gate)

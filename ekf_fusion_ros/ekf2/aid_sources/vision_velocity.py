@@ -12,6 +12,7 @@ from ekf_fusion_ros.ekf2.fusion import fuse_vertical_velocity
 from ekf_fusion_ros.ekf2.resets import Resets
 from ekf_fusion_ros.ekf2.resets import vision_velocity_in_filter_frame
 from ekf_fusion_ros.ekf2.state import SECOND
+from ekf_fusion_ros.ekf2.state import VN
 from ekf_fusion_ros.samples import VelocityFrame
 from ekf_fusion_ros.samples import VisionSample
 
@@ -44,21 +45,20 @@ class VisionVelocity:
     def fuse(self, sample: VisionSample, gnss_healthy: bool) -> None:
         """Fuse the velocity of a sample."""
         f = self._f
-        velocity, covariance = vision_velocity_in_filter_frame(f, sample)
-        innovation = (f.x[4:7] - velocity).tolist()
+        velocity, variance = vision_velocity_in_filter_frame(f, sample)
+        innovation = [f.x.item(VN + i) - velocity[i] for i in range(3)]
         if f.late(f.times.hor_vel, round(f.params.aiding.reset_timeout * SECOND)):
             if f.late(f.times.flow, OTHER_AID_US) and f.late(f.times.hor_pos, OTHER_AID_US):
                 self._resets.velocity_to_aiding(gnss_healthy)
-        noise = np.maximum(covariance.diagonal(), NOISE_FLOOR)
+        noise = [max(v, NOISE_FLOOR) for v in variance]
         f.last_velocity = velocity[0:2]
         f.last_velocity_variance = noise[0:2]
         gate = f.params.vision.vel_gate
         in_body = sample.velocity_frame is VelocityFrame.BODY_FRD
         if in_body and f.params.vision.velocity_tells_attitude:
-            noise = np.maximum((f.rot.T @ covariance @ f.rot).diagonal(), NOISE_FLOOR)
-            fuse_body_velocity(f, f.observations.ev_hor_vel, f.observations.ev_ver_vel,
-                               f.rot.T @ velocity, noise, gate)
+            measured = f.rot.T @ np.array(velocity)
+            fuse_body_velocity(f, f.observations.ev_hor_vel, f.observations.ev_ver_vel, measured,
+                               np.maximum(sample.velocity_cov.diagonal(), NOISE_FLOOR), gate)
             return
-        fuse_horizontal_velocity(f, f.observations.ev_hor_vel, innovation[0:2],
-                                 noise[0:2].tolist(), gate)
-        fuse_vertical_velocity(f, f.observations.ev_ver_vel, innovation[2], float(noise[2]), gate)
+        fuse_horizontal_velocity(f, f.observations.ev_hor_vel, innovation[0:2], noise[0:2], gate)
+        fuse_vertical_velocity(f, f.observations.ev_ver_vel, innovation[2], noise[2], gate)
