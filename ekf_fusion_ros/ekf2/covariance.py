@@ -19,9 +19,9 @@ from ekf_fusion_ros.kernels.prediction import advance_covariance
 from ekf_fusion_ros.kernels.update import ACCEL_BIAS_VARIANCE_MAX
 from ekf_fusion_ros.kernels.update import MAG_ACTIVE
 from ekf_fusion_ros.kernels.update import WIND_ACTIVE
-from ekf_fusion_ros.kernels.update import apply_direct
-from ekf_fusion_ros.kernels.update import apply_pair
 from ekf_fusion_ros.kernels.update import apply_update
+from ekf_fusion_ros.kernels.update import fuse_state
+from ekf_fusion_ros.kernels.update import fuse_two_states
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 
 Array = NDArray[np.float64]
@@ -122,10 +122,13 @@ class Covariance:
                 self.p[state, state] = self._saved[axis]
                 self.inhibited[axis] = 0.0
 
-    def fuse_direct(self, x: Array, state: int, variance: float, innovation: float) -> bool:
-        """Correct with an observation of one state; False on a numerical fault."""
-        healthy: bool = apply_direct(self.p, x, state, variance, innovation, self.limits)
-        return healthy
+    def fuse_state(
+        self, x: Array, state: int, innovation: float, noise: float, gate: float,
+    ) -> tuple[float, float, bool]:
+        """Gate and fuse an observation of one state; see kernels.update.fuse_state."""
+        outcome: tuple[float, float, bool] = fuse_state(
+            self.p, x, state, innovation, noise, gate, self.limits)
+        return outcome
 
     def fuse(self, x: Array, gain: Array, hp: Array, innovation: float) -> bool:
         """Correct with a gain (24,) and H P (24,); False on a numerical fault."""
@@ -139,13 +142,15 @@ class Covariance:
         healthy: bool = apply_yaw(self.p, x, jacobian, gain, variance, innovation, self.limits)
         return healthy
 
-    def fuse_pair(
-        self, x: Array, first: int, variance: Sequence[float], innovation: Sequence[float],
-    ) -> int:
-        """Correct with observations of two neighbouring states; bit i is set for a fault of i."""
-        faults: int = apply_pair(self.p, x, first, variance[0], variance[1], innovation[0],
-                                 innovation[1], self.limits)
-        return faults
+    def fuse_two_states(
+        self, x: Array, first: int, innovation: Sequence[float], noise: Sequence[float],
+        gate: float, largest_ratio: float,
+    ) -> tuple[float, float, float, int]:
+        """Gate and fuse two neighbouring states; see kernels.update.fuse_two_states."""
+        outcome: tuple[float, float, float, int] = fuse_two_states(
+            self.p, x, first, innovation[0], innovation[1], noise[0], noise[1], gate,
+            largest_ratio, self.limits)
+        return outcome
 
     def fuse_field(
         self, x: Array, innovation: Array, axes: int, noise: float, all_states: bool,

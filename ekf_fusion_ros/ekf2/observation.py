@@ -42,6 +42,18 @@ class Observation:
         self.variance[:] = variance
         self.test_ratio = test_ratio
 
+    def judge(
+        self, time_us: int, innovation: Sequence[float], variance: Sequence[float],
+        test_ratio: float, largest: float = 1.0,
+    ) -> bool:
+        """Take down an attempt; True, and counted as fused, where its ratio is not too large."""
+        self.record(time_us, innovation, variance, test_ratio)
+        if test_ratio <= largest:
+            self.accept()
+            return True
+        self.reject()
+        return False
+
     def accept(self) -> None:
         """Count the attempt as fused."""
         self.rejected_last = False

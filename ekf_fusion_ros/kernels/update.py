@@ -133,17 +133,47 @@ def apply_direct(
 
 
 @kernel
-def apply_pair(
-    p: Array, x: Array, first: int, variance_a: float, variance_b: float, innovation_a: float,
-    innovation_b: float, limits: Array,
-) -> int:
-    """Update with two neighbouring states, whose innovations were taken before the first.
+def test_ratio(innovation: float, variance: float, gate: float) -> float:
+    """Return innovation^2 / (gate^2 variance), the test ratio; the gate is at least one sigma."""
+    gate = max(gate, 1.0)
+    return innovation * innovation / (gate * gate * variance)
 
-    Returns a word whose bit i tells that the update of observation i was unhealthy.
+
+@kernel
+def fuse_state(
+    p: Array, x: Array, state: int, innovation: float, noise: float, gate: float, limits: Array,
+) -> tuple[float, float, bool]:
+    """Observe one state: fuse it where the test ratio is at most 1.
+
+    innovation (predicted minus measured) and noise variance in the units of the state. Returns
+    the innovation variance, the test ratio, and False where the update was unhealthy.
     """
+    variance = p[state, state] + noise
+    ratio = test_ratio(innovation, variance, gate)
+    healthy = True
+    if ratio <= 1.0:
+        healthy = apply_direct(p, x, state, variance, innovation, limits)
+    return variance, ratio, healthy
+
+
+@kernel
+def fuse_two_states(
+    p: Array, x: Array, first: int, innovation_a: float, innovation_b: float, noise_a: float,
+    noise_b: float, gate: float, largest_ratio: float, limits: Array,
+) -> tuple[float, float, float, int]:
+    """Observe two neighbouring states: fuse both where no test ratio is above the largest.
+
+    Innovations and their variances are those from before the first. Returns both variances, the
+    larger ratio, and a word whose bit i tells that the update of observation i was unhealthy.
+    """
+    variance_a = p[first, first] + noise_a
+    variance_b = p[first + 1, first + 1] + noise_b
+    ratio = max(test_ratio(innovation_a, variance_a, gate),
+                test_ratio(innovation_b, variance_b, gate))
     faults = 0
-    if not apply_direct(p, x, first, variance_a, innovation_a, limits):
-        faults += 1
-    if not apply_direct(p, x, first + 1, variance_b, innovation_b, limits):
-        faults += 2
-    return faults
+    if ratio <= largest_ratio:
+        if not apply_direct(p, x, first, variance_a, innovation_a, limits):
+            faults += 1
+        if not apply_direct(p, x, first + 1, variance_b, innovation_b, limits):
+            faults += 2
+    return variance_a, variance_b, ratio, faults

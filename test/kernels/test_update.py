@@ -10,8 +10,9 @@ from oracles import seeds
 import pytest
 
 from ekf_fusion_ros.kernels.update import apply_direct
-from ekf_fusion_ros.kernels.update import apply_pair
 from ekf_fusion_ros.kernels.update import apply_update
+from ekf_fusion_ros.kernels.update import fuse_state
+from ekf_fusion_ros.kernels.update import fuse_two_states
 from ekf_fusion_ros.kernels.update import limit_covariance
 
 ALL_FREE = np.array((0.0, 0.0, 0.0, 1.0, 1.0, 1.0))
@@ -53,11 +54,15 @@ def test_direct_observation_of_a_state(seed):
     np.testing.assert_allclose(x[8], before - 2.0 * p[8, 8] / (p[8, 8] + noise))
 
 
-def test_a_pair_uses_the_innovations_from_before_the_first():
+def test_two_states_use_the_innovations_from_before_the_first():
     p, x = covariance(6), state(6)
     before, out = x.copy(), p.copy()
-    variance = np.array((p[7, 7] + 0.4, p[8, 8] + 0.6))
-    assert apply_pair(out, x, 7, *variance, 0.5, -0.2, ALL_FREE) == 0
+    north, east, ratio, faults = fuse_two_states(
+        out, x, 7, 0.5, -0.2, 0.4, 0.6, 3.0, 1.0, ALL_FREE)
+    variance = p[7, 7] + 0.4, p[8, 8] + 0.6
+    assert (north, east) == pytest.approx(variance)
+    assert ratio == pytest.approx(max(0.25 / (9.0 * north), 0.04 / (9.0 * east)))
+    assert faults == 0
     first = p - np.outer(p[:, 7], p[7]) / variance[0]
     second = first - np.outer(first[:, 8], first[8]) / variance[1]
     np.testing.assert_allclose(out, second, rtol=1e-9, atol=1e-12)
@@ -66,11 +71,25 @@ def test_a_pair_uses_the_innovations_from_before_the_first():
 
 
 @pytest.mark.parametrize(('bad', 'word'), [(7, 1), (8, 2)])
-def test_a_pair_tells_which_observation_was_unhealthy(bad, word):
+def test_two_states_tell_which_observation_was_unhealthy(bad, word):
     p, x = covariance(6), state(6)
-    variance = {7: p[7, 7] + 0.4, 8: p[8, 8] + 0.6}
-    variance[bad] = 0.5 * p[bad, bad]
-    assert apply_pair(p, x, 7, variance[7], variance[8], 0.1, 0.1, ALL_FREE) == word
+    noise = {7: 0.4, 8: 0.6}
+    noise[bad] = -0.5 * p[bad, bad]
+    found = fuse_two_states(p, x, 7, 0.1, 0.1, noise[7], noise[8], 3.0, 1.0, ALL_FREE)
+    assert found[3] == word
+
+
+@pytest.mark.parametrize('sigmas', [2.9, 3.1])
+def test_a_gate_is_a_number_of_sigmas(sigmas):
+    p, x = covariance(6), state(6)
+    before, out = x.copy(), p.copy()
+    sigma = np.sqrt(p[9, 9] + 0.4)
+    variance, ratio, healthy = fuse_state(out, x, 9, sigmas * sigma, 0.4, 3.0, ALL_FREE)
+    assert variance == pytest.approx(sigma ** 2)
+    assert ratio == pytest.approx((sigmas / 3.0) ** 2)
+    assert healthy
+    assert np.array_equal(x, before) is (sigmas > 3.0)
+    assert np.array_equal(out, p) is (sigmas > 3.0)
 
 
 def test_an_update_that_would_make_a_variance_negative_is_refused():

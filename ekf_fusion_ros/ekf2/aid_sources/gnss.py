@@ -14,7 +14,6 @@ from ekf_fusion_ros.ekf2.filter import GnssFix
 from ekf_fusion_ros.ekf2.fusion import fuse_horizontal_position
 from ekf_fusion_ros.ekf2.fusion import fuse_horizontal_velocity
 from ekf_fusion_ros.ekf2.fusion import fuse_vertical_velocity
-from ekf_fusion_ros.ekf2.fusion import test_ratio
 from ekf_fusion_ros.ekf2.gnss_checks import GnssChecks
 from ekf_fusion_ros.ekf2.resets import Resets
 from ekf_fusion_ros.ekf2.state import FILTER_PERIOD_US
@@ -23,6 +22,7 @@ from ekf_fusion_ros.ekf2.state import PN
 from ekf_fusion_ros.ekf2.state import SECOND
 from ekf_fusion_ros.ekf2.yaw_recovery import YawRecovery
 from ekf_fusion_ros.estimator import GeoPoint
+from ekf_fusion_ros.kernels.update import test_ratio
 from ekf_fusion_ros.mathlib.rotation import cross
 from ekf_fusion_ros.samples import GnssSample
 

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.filter import Filter
-from ekf_fusion_ros.ekf2.fusion import test_ratio
 from ekf_fusion_ros.ekf2.state import EARTH_FIELD
 from ekf_fusion_ros.kernels.magnetic import DECLINATION_SPREAD
 from ekf_fusion_ros.kernels.magnetic import limit_field
 from ekf_fusion_ros.kernels.magnetic import observe_declination
 from ekf_fusion_ros.kernels.magnetic import predict_field
+from ekf_fusion_ros.kernels.update import test_ratio
 
 Array = NDArray[np.float64]
 
