@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.state import FILTER_PERIOD
 from ekf_fusion_ros.ekf2.state import SIZE
+from ekf_fusion_ros.kernels.compile import kernel
 from ekf_fusion_ros.kernels.heading import apply_yaw
+from ekf_fusion_ros.kernels.magnetic import fuse_declination
 from ekf_fusion_ros.kernels.magnetic import fuse_field
 from ekf_fusion_ros.kernels.prediction import GRAVITY
 from ekf_fusion_ros.kernels.prediction import PROCESS
@@ -162,6 +164,14 @@ class Covariance:
             variance)
         return outcome
 
+    def fuse_declination(
+        self, x: Array, declination: float, noise: float,
+    ) -> tuple[float, float, int]:
+        """Correct with the declination; see kernels.magnetic.fuse_declination."""
+        outcome: tuple[float, float, int] = fuse_declination(
+            x, self.p, declination, noise, self.limits)
+        return outcome
+
     def decorrelate(self, first: int, size: int) -> None:
         """Remove all correlations of states first .. first + size - 1, keeping variances."""
         variances = np.diag(self.p)[first:first + size].copy()
@@ -234,6 +244,7 @@ def quat_by_rotation_vector(q: Array) -> Array:
     return jacobian
 
 
+@kernel
 def rotation_vector_variances(q: Array, p: Array) -> Array:
     """Return the variances (3,) rad^2 of the rotation vector of q, from the quaternion block."""
     sign = -1.0 if q[0] < 0.0 else 1.0

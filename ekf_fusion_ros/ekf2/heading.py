@@ -68,7 +68,8 @@ class HeadingFusion:
             self._fuse(wrap_pi(predicted - self.last_static_yaw), noise)
             return
         self.last_static_yaw = predicted
-        if float(np.trace(f.cov.p[0:4, 0:4])) > QUAT_VARIANCE_MAX:
+        p = f.cov.p
+        if sum(p.item(i, i) for i in range(4)) > QUAT_VARIANCE_MAX:
             self._fuse(0.0, MOVING_YAW_NOISE)
         else:
             self._fuse(0.0 if measured is None else wrap_pi(predicted - measured), noise)

@@ -70,7 +70,8 @@ def apply_yaw(
 ) -> bool:
     """Correct with what observe_yaw has found and an innovation variance; False on a fault.
 
-    The gain of the magnetic field is cut, and that of the wind while it is not estimated.
+    innovation in rad, variance in rad^2; p (24, 24), x (24,), limits (6,) see kernels.update. The
+    gain of the magnetic field is cut, and that of the wind while it is not estimated.
     """
     last = 24 if limits[WIND_ACTIVE] != 0.0 else 22
     for i in range(16):

@@ -145,6 +145,31 @@ def fuse_field(
 
 
 @kernel
+def fuse_declination(
+    x: Array, p: Array, wanted: float, noise: float, limits: Array,
+) -> tuple[float, float, int]:
+    """Fuse a declination in rad with a noise variance in rad^2, in place.
+
+    Returns the innovation, clipped to DECLINATION_SPREAD, its variance, and 0 = done, 1 = variance
+    not above the noise, 2 = P unhealthy.
+    """
+    hp, gain = np.empty(24), np.empty(24)
+    variance = observe_declination(x, p, hp, gain) + noise
+    innovation = math.atan2(x[17], x[16]) - wanted
+    innovation = min(max(innovation, -DECLINATION_SPREAD), DECLINATION_SPREAD)
+    if variance <= noise:
+        return innovation, variance, 1
+    for i in range(24):
+        gain[i] /= variance
+    for k in range(3):
+        if limits[k] != 0.0:
+            gain[13 + k] = 0.0
+    if apply_update(p, x, gain, hp, innovation, limits):
+        return innovation, variance, 0
+    return innovation, variance, 2
+
+
+@kernel
 def observe_declination(x: Array, p: Array, hp: Array, gain: Array) -> float:
     """Fill H P and P H' (24,) of atan2(east, north) of the earth field; return H P H', rad^2."""
     north, east = x[16], x[17]

@@ -9,15 +9,15 @@ from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.state import EARTH_FIELD
-from ekf_fusion_ros.kernels.magnetic import DECLINATION_SPREAD
 from ekf_fusion_ros.kernels.magnetic import limit_field
-from ekf_fusion_ros.kernels.magnetic import observe_declination
 from ekf_fusion_ros.kernels.magnetic import predict_field
 from ekf_fusion_ros.kernels.update import test_ratio
 
 Array = NDArray[np.float64]
 
 MIN_FIELD = 1e-3
+VARIANCE_TOO_SMALL = 1
+"""What the kernels return where an innovation variance is below the noise."""
 
 
 def table_declination(f: Filter) -> float:
@@ -62,7 +62,7 @@ def fuse_three_axes(f: Filter, measured: Array, all_states: bool) -> bool:
     outcome = f.cov.fuse_field(f.x, innovation, 2 if f.flags.synthetic_mag_z else 3, noise,
                                all_states, table_declination(f), shortest_field(f), variance)
     faults.mag_x, faults.mag_y, faults.mag_z = (code != 0 for code in outcome)
-    if 1 in outcome:
+    if VARIANCE_TOO_SMALL in outcome:
         _restart_field_covariance(f)
     record.variance[:] = variance.tolist()
     return True
@@ -76,22 +76,13 @@ def _restart_field_covariance(f: Filter) -> None:
 
 def fuse_declination(f: Filter, sigma: float) -> None:
     """Fuse atan2(east, north) of the earth field with a sigma in rad."""
-    north, east = float(f.x[16]), float(f.x[17])
-    if abs(north) < MIN_FIELD * 1e-3:
+    if abs(f.x.item(16)) < MIN_FIELD * 1e-3:
         return
-    noise = sigma * sigma
-    hp, gain = np.empty(24), np.empty(24)
-    variance = observe_declination(f.x, f.cov.p, hp, gain) + noise
-    if variance <= noise:
-        f.faults.declination = True
+    innovation, variance, outcome = f.cov.fuse_declination(f.x, declination(f), sigma * sigma)
+    f.faults.declination = outcome != 0
+    if outcome == VARIANCE_TOO_SMALL:
         return
-    innovation = math.atan2(east, north) - declination(f)
-    innovation = min(max(innovation, -DECLINATION_SPREAD), DECLINATION_SPREAD)
-    gain /= variance
-    gain[13:16] *= 1.0 - f.cov.inhibited
-    f.observations.declination.record(f.t_now, (innovation,), (variance,), 0.0)
-    f.observations.declination.accept()
-    f.faults.declination = not f.cov.fuse(f.x, gain, hp, innovation)
+    f.observations.declination.judge(f.t_now, (innovation,), (variance,), 0.0)
     limit_field(f.x, table_declination(f), shortest_field(f))
 
 
