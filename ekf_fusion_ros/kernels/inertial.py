@@ -7,7 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ekf_fusion_ros.kernels.compile import four
 from ekf_fusion_ros.kernels.compile import kernel
+from ekf_fusion_ros.kernels.compile import three
 from ekf_fusion_ros.mathlib.rotation import quat_from_rotation_vector
 from ekf_fusion_ros.mathlib.rotation import quat_multiply
 from ekf_fusion_ros.mathlib.rotation import quat_normalise
@@ -47,12 +49,13 @@ def accumulate_imu(
     step = quat_from_rotation_vector(delta_angle)
     quat[:] = quat_normalise(quat_multiply(quat, step))
     # v' = R(step)^T v, by the vector part of the quaternion
-    w, x, y, z = step[0], -step[1], -step[2], -step[3]
+    w, x, y, z = four(step)
+    x, y, z = -x, -y, -z
     for turn in range(2):
         if turn == 0:
-            vx, vy, vz = velocity[0], velocity[1], velocity[2]
+            vx, vy, vz = three(velocity)
         else:
-            vx, vy, vz = delta_velocity[0], delta_velocity[1], delta_velocity[2]
+            vx, vy, vz = three(delta_velocity)
         tx = 2.0 * (y * vz - z * vy)
         ty = 2.0 * (z * vx - x * vz)
         tz = 2.0 * (x * vy - y * vx)
@@ -96,7 +99,8 @@ def take_imu(
     s = state[0]
     metrics = s['vibration']
     update_vibration(delta_angle, delta_velocity, s['previous'], metrics)
-    turned = math.sqrt(delta_angle[0] ** 2 + delta_angle[1] ** 2 + delta_angle[2] ** 2)
+    ax, ay, az = three(delta_angle)
+    turned = math.sqrt(ax * ax + ay * ay + az * az)
     word = 0
     if metrics[1] > angle_limit or metrics[2] > velocity_limit or turned > turn_limit:
         word += MOVED
@@ -114,14 +118,14 @@ def update_vibration(
 
     previous (6,) holds the sample before, metrics (3,) the filtered values.
     """
-    ax, ay, az = delta_angle[0], delta_angle[1], delta_angle[2]
-    bx, by, bz = previous[0], previous[1], previous[2]
+    ax, ay, az = three(delta_angle)
+    bx, by, bz = three(previous)
+    dx, dy, dz = three(delta_velocity)
+    ex, ey, ez = three(previous[3:6])
     cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     coning = math.sqrt(cx * cx + cy * cy + cz * cz)
     angle = math.sqrt((ax - bx) ** 2 + (ay - by) ** 2 + (az - bz) ** 2)
-    velocity = math.sqrt(
-        (delta_velocity[0] - previous[3]) ** 2 + (delta_velocity[1] - previous[4]) ** 2
-        + (delta_velocity[2] - previous[5]) ** 2)
+    velocity = math.sqrt((dx - ex) ** 2 + (dy - ey) ** 2 + (dz - ez) ** 2)
     metrics[0] = 0.99 * metrics[0] + 0.01 * coning
     metrics[1] = 0.99 * metrics[1] + 0.01 * angle
     metrics[2] = 0.99 * metrics[2] + 0.01 * velocity

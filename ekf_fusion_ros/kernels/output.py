@@ -7,10 +7,13 @@ presence of multi-rate and multi-delay vector measurements", 2015.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.kernels.compile import kernel
+from ekf_fusion_ros.kernels.compile import three
 from ekf_fusion_ros.kernels.prediction import GRAVITY
 from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
 from ekf_fusion_ros.mathlib.rotation import quat_from_rotation_vector
@@ -59,21 +62,19 @@ def propagate_output(
     yaw (2,) accumulates the turn about the vertical and low-passes its rate; rate (3,) receives
     the raw body rate.
     """
-    angle = np.empty(3)
-    spin = 0.0
-    for i in range(3):
-        rate[i] = delta_angle[i] / angle_dt
-        angle[i] = delta_angle[i] - x[10 + i] * bias_scale + correction[i]
-        spin += angle[i] * rot[2, i]
+    rate[:] = delta_angle / angle_dt
+    angle = delta_angle - x[10:13] * bias_scale + correction
+    a0, a1, a2 = three(angle)
+    z0, z1, z2 = three(rot[2])
+    spin = a0 * z0 + a1 * z1 + a2 * z2
     yaw[0] += spin
     yaw[1] = 0.95 * yaw[1] + 0.05 * spin / angle_dt
     out[0:4] = quat_normalise(quat_multiply(out[0:4], quat_from_rotation_vector(angle)))
     rot[:, :] = matrix_from_quat(out[0:4])
-    dv0 = delta_velocity[0] - x[13] * bias_scale
-    dv1 = delta_velocity[1] - x[14] * bias_scale
-    dv2 = delta_velocity[2] - x[15] * bias_scale
+    dv0, dv1, dv2 = three(delta_velocity - x[13:16] * bias_scale)
     for i in range(3):
-        increment = rot[i, 0] * dv0 + rot[i, 1] * dv1 + rot[i, 2] * dv2
+        r0, r1, r2 = three(rot[i])
+        increment = r0 * dv0 + r1 * dv1 + r2 * dv2
         if i == 2:
             increment += GRAVITY * velocity_dt
         before = out[4 + i]
@@ -105,15 +106,20 @@ def correct_output(
     """
     error = attitude_error(x[0:4], history[oldest, 0:4])
     correction[:] = error * att_gain
-    norm = np.zeros(2)
-    for i in range(6):
-        difference = x[4 + i] - history[oldest, 4 + i]
-        integral[i] += difference
-        gain = vel_gain if i < 3 else pos_gain
-        shift = difference * gain + integral[i] * gain * gain * 0.1
-        history[:, 4 + i] += shift
-        out[4 + i] += shift
-        norm[i // 3] += difference * difference
-    errors[0] = np.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
-    errors[1] = np.sqrt(norm[0])
-    errors[2] = np.sqrt(norm[1])
+    difference = x[4:10] - history[oldest, 4:10]
+    integral += difference
+    shift = np.empty(6)
+    shift[0:3] = difference[0:3] * vel_gain + integral[0:3] * (vel_gain * vel_gain * 0.1)
+    shift[3:6] = difference[3:6] * pos_gain + integral[3:6] * (pos_gain * pos_gain * 0.1)
+    history[:, 4:10] += shift
+    out[4:10] += shift
+    errors[0] = length(error)
+    errors[1] = length(difference[0:3])
+    errors[2] = length(difference[3:6])
+
+
+@kernel
+def length(v: Array) -> float:
+    """Return |v| of a vector (3,)."""
+    v0, v1, v2 = three(v)
+    return math.sqrt(v0 * v0 + v1 * v1 + v2 * v2)

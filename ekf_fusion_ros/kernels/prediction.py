@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.kernels.compile import COMPILED
+from ekf_fusion_ros.kernels.compile import four
 from ekf_fusion_ros.kernels.compile import kernel
+from ekf_fusion_ros.kernels.compile import three
 from ekf_fusion_ros.kernels.update import ACCEL_BIAS_VARIANCE_MAX
 from ekf_fusion_ros.kernels.update import MAG_ACTIVE
 from ekf_fusion_ros.kernels.update import WIND_ACTIVE
@@ -53,6 +55,12 @@ rad^2 and (m/s)^2, additive noise of the states, variances of frozen acceleromet
 low-passed height rate in m/s, sigma of the wind and drift variances per period."""
 
 
+STATE_LIMITS = np.repeat(
+    (1.0, 1e3, 1e6, math.radians(20.0), 1.0, 1.0, 0.5, 100.0), (4, 3, 3, 3, 3, 3, 3, 2))
+"""What is physically possible in the units of the state; gyro bias in rad/s, and accelerometer
+bias in terms of its own limit."""
+
+
 @kernel
 def predict_state(x: Array, rot: Array, imu: Array, earth_rate: Array, accel_lpf: Array) -> None:
     """Strapdown of x (24,) and the cached rotation (3, 3) over imu (8,), in place.
@@ -60,18 +68,16 @@ def predict_state(x: Array, rot: Array, imu: Array, earth_rate: Array, accel_lpf
     earth_rate (3,) rad/s NED. accel_lpf (2,) is a leaky sum of the horizontal velocity increments,
     m/s^2 for a time constant of 1 s.
     """
-    correction = np.empty(3)
-    for i in range(3):
-        turned = (rot[0, i] * earth_rate[0] + rot[1, i] * earth_rate[1]
-                  + rot[2, i] * earth_rate[2])
-        correction[i] = imu[i] - x[10 + i] - turned * imu[6]
+    turned = np.dot(earth_rate, rot)
+    correction = imu[0:3] - x[10:13] - turned * imu[6]
     x[0:4] = quat_normalise(quat_multiply(x[0:4], quat_from_rotation_vector(correction)))
     rot[:, :] = matrix_from_quat(x[0:4])
-    dv0, dv1, dv2 = imu[3] - x[13], imu[4] - x[14], imu[5] - x[15]
+    dv0, dv1, dv2 = three(imu[3:6] - x[13:16])
     dt = imu[7]
     decay = 1.0 - dt
     for i in range(3):
-        increment = rot[i, 0] * dv0 + rot[i, 1] * dv1 + rot[i, 2] * dv2
+        r0, r1, r2 = three(rot[i])
+        increment = r0 * dv0 + r1 * dv1 + r2 * dv2
         if i < 2:
             accel_lpf[i] = accel_lpf[i] * decay + increment
         else:
@@ -111,29 +117,10 @@ def advance_state(
 @kernel
 def limit_state(x: Array, dt: float, accel_bias_limit: float) -> None:
     """Clamp x (24,) to what is physically possible; dt is the mean filter period in s."""
-    gyro_limit = math.radians(20.0) * dt
-    accel_limit = accel_bias_limit * dt
-    for i in range(24):
-        if i < 4:
-            limit = 1.0
-        elif i < 7:
-            limit = 1e3
-        elif i < 10:
-            limit = 1e6
-        elif i < 13:
-            limit = gyro_limit
-        elif i < 16:
-            limit = accel_limit
-        elif i < 19:
-            limit = 1.0
-        elif i < 22:
-            limit = 0.5
-        else:
-            limit = 100.0
-        if x[i] > limit:
-            x[i] = limit
-        elif x[i] < -limit:
-            x[i] = -limit
+    limits = STATE_LIMITS.copy()
+    limits[10:13] *= dt
+    limits[13:16] *= accel_bias_limit * dt
+    x[:] = np.minimum(np.maximum(x, -limits), limits)
 
 
 @kernel
@@ -143,8 +130,8 @@ def fill_transition(q: Array, da: Array, dv: Array, dt: float, f: Array) -> None
     q (4,) is the predicted attitude, da and dv (3,) the bias-corrected increments. R(q) is
     differentiated in its unit-norm form (diagonal 1 - 2(..)), the one used by the prediction.
     """
-    q0, q1, q2, q3 = q[0], q[1], q[2], q[3]
-    a, b, c = 0.5 * da[0], 0.5 * da[1], 0.5 * da[2]
+    q0, q1, q2, q3 = four(q)
+    a, b, c = three(0.5 * da)
     f[0, 0], f[0, 1], f[0, 2], f[0, 3] = 1.0, -a, -b, -c
     f[1, 0], f[1, 1], f[1, 2], f[1, 3] = a, 1.0, c, -b
     f[2, 0], f[2, 1], f[2, 2], f[2, 3] = b, -c, 1.0, a
@@ -153,7 +140,7 @@ def fill_transition(q: Array, da: Array, dv: Array, dt: float, f: Array) -> None
     f[1, 10], f[1, 11], f[1, 12] = -0.5 * q0, 0.5 * q3, -0.5 * q2
     f[2, 10], f[2, 11], f[2, 12] = -0.5 * q3, -0.5 * q0, 0.5 * q1
     f[3, 10], f[3, 11], f[3, 12] = 0.5 * q2, -0.5 * q1, -0.5 * q0
-    x, y, z = dv[0], dv[1], dv[2]
+    x, y, z = three(dv)
     f[4, 0] = 2.0 * (q2 * z - q3 * y)
     f[4, 1] = 2.0 * (q2 * y + q3 * z)
     f[4, 2] = 2.0 * (q1 * y + q0 * z) - 4.0 * q2 * x
@@ -167,12 +154,11 @@ def fill_transition(q: Array, da: Array, dv: Array, dt: float, f: Array) -> None
     f[6, 2] = 2.0 * (q3 * y - q0 * x) - 4.0 * q2 * z
     f[6, 3] = 2.0 * (q1 * x + q2 * y)
     rot = matrix_from_quat(q)
+    f[4:7, 13:16] = -rot
     for i in range(3):
         f[4 + i, 4 + i] = 1.0
         f[7 + i, 7 + i] = 1.0
         f[7 + i, 4 + i] = dt
-        for j in range(3):
-            f[4 + i, 13 + j] = -rot[i, j]
 
 
 @kernel

@@ -43,10 +43,10 @@ def _subtract_by_element(p: Array, gain: Array, hp: Array) -> bool:
 
 
 def _subtract_as_arrays(p: Array, gain: Array, hp: Array) -> bool:
-    khp = np.outer(gain, hp)
-    if np.any(np.diagonal(p) < np.diagonal(khp)):
+    if (p.ravel()[::25] < gain * hp).any():
         return False
-    np.subtract(p, 0.5 * (khp + khp.T), out=p)
+    half = np.multiply.outer(0.5 * gain, hp)
+    p -= half + half.T
     return True
 
 

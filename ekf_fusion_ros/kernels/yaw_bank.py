@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.kernels.compile import kernel
+from ekf_fusion_ros.kernels.compile import three
 from ekf_fusion_ros.kernels.prediction import GRAVITY
 
 Array = NDArray[np.float64]
@@ -76,34 +77,34 @@ def predict_attitudes(
     rot: Array, bias: Array, imu: Array, accel: Array, gain: float, airspeed: float,
 ) -> None:
     """Turn every rot by the delta angle of imu (8,), lean it to the filtered accel (3,)."""
-    norm = math.sqrt(accel[0] ** 2 + accel[1] ** 2 + accel[2] ** 2)
-    dt = imu[6]
+    fx, fy, fz = three(accel)
+    norm = math.sqrt(fx * fx + fy * fy + fz * fz)
+    ix, iy, iz = three(imu)
+    dt = float(imu[6])
     rate_dt = max(dt, 1e-3)
     for m in range(rot.shape[0]):
-        wx = imu[0] / rate_dt - bias[m, 0]
-        wy = imu[1] / rate_dt - bias[m, 1]
-        wz = imu[2] / rate_dt - bias[m, 2]
+        bx, by, bz = three(bias[m])
+        wx, wy, wz = ix / rate_dt - bx, iy / rate_dt - by, iz / rate_dt - bz
         tx = ty = tz = 0.0
         if gain > 0.0:
-            ax, ay, az = accel[0], accel[1], accel[2]
+            ax, ay, az = fx, fy, fz
             if airspeed > 0.0:
                 ay -= airspeed * wz
                 az += airspeed * wy
-            gx, gy, gz = rot[m, 2, 0], rot[m, 2, 1], rot[m, 2, 2]
+            gx, gy, gz = three(rot[m, 2])
             scale = gain / norm
             tx = (gy * az - gz * ay) * scale
             ty = (gz * ax - gx * az) * scale
             tz = (gx * ay - gy * ax) * scale
         if math.sqrt(wx * wx + wy * wy + wz * wz) < BIAS_LEARN_RATE_MAX:
             step = BIAS_GAIN * dt
-            bias[m, 0] = min(max(bias[m, 0] - tx * step, -BIAS_LIMIT), BIAS_LIMIT)
-            bias[m, 1] = min(max(bias[m, 1] - ty * step, -BIAS_LIMIT), BIAS_LIMIT)
-            bias[m, 2] = min(max(bias[m, 2] - tz * step, -BIAS_LIMIT), BIAS_LIMIT)
-        dx = imu[0] + (tx - bias[m, 0]) * dt
-        dy = imu[1] + (ty - bias[m, 1]) * dt
-        dz = imu[2] + (tz - bias[m, 2]) * dt
+            bx = min(max(bx - tx * step, -BIAS_LIMIT), BIAS_LIMIT)
+            by = min(max(by - ty * step, -BIAS_LIMIT), BIAS_LIMIT)
+            bz = min(max(bz - tz * step, -BIAS_LIMIT), BIAS_LIMIT)
+            bias[m, 0], bias[m, 1], bias[m, 2] = bx, by, bz
+        dx, dy, dz = ix + (tx - bx) * dt, iy + (ty - by) * dt, iz + (tz - bz) * dt
         for i in range(3):
-            a, b, c = rot[m, i, 0], rot[m, i, 1], rot[m, i, 2]
+            a, b, c = three(rot[m, i])
             a2 = a + b * dz - c * dy
             b2 = b + c * dx - a * dz
             c2 = c + a * dy - b * dx
@@ -116,25 +117,31 @@ def predict_models(rot: Array, state: Array, cov: Array, imu: Array) -> None:
     """Propagate velocity and yaw of every model with the velocity increment of imu (8,)."""
     velocity_var = (ACCEL_NOISE * imu[7]) ** 2
     yaw_var = (GYRO_NOISE * imu[6]) ** 2
+    vx, vy, vz = three(imu[3:6])
     for m in range(rot.shape[0]):
+        n0, n1, n2 = three(rot[m, 0])
+        e0, e1, e2 = three(rot[m, 1])
         if abs(rot[m, 2, 0]) < abs(rot[m, 2, 1]):
-            yaw = math.atan2(rot[m, 1, 0], rot[m, 0, 0])
+            yaw = math.atan2(e0, n0)
         else:
-            yaw = math.atan2(-rot[m, 0, 1], rot[m, 1, 1])
-        dn = rot[m, 0, 0] * imu[3] + rot[m, 0, 1] * imu[4] + rot[m, 0, 2] * imu[5]
-        de = rot[m, 1, 0] * imu[3] + rot[m, 1, 1] * imu[4] + rot[m, 1, 2] * imu[5]
+            yaw = math.atan2(-n1, e1)
+        dn = n0 * vx + n1 * vy + n2 * vz
+        de = e0 * vx + e1 * vy + e2 * vz
         state[m, 0] += dn
         state[m, 1] += de
         state[m, 2] = yaw
         # d(dv_NE)/d(yaw) = (-de, dn): the increments rotate with the yaw error
-        p02 = cov[m, 0, 2] - de * cov[m, 2, 2]
-        p12 = cov[m, 1, 2] + dn * cov[m, 2, 2]
-        p00 = cov[m, 0, 0] - de * (cov[m, 0, 2] + p02)
-        p11 = cov[m, 1, 1] + dn * (cov[m, 1, 2] + p12)
-        p01 = cov[m, 0, 1] - de * cov[m, 1, 2] + dn * p02
+        c00, c01, c02 = three(cov[m, 0])
+        _, c11, c12 = three(cov[m, 1])
+        c22 = float(cov[m, 2, 2])
+        p02 = c02 - de * c22
+        p12 = c12 + dn * c22
+        p00 = c00 - de * (c02 + p02)
+        p11 = c11 + dn * (c12 + p12)
+        p01 = c01 - de * c12 + dn * p02
         cov[m, 0, 0] = max(p00 + velocity_var, VARIANCE_FLOOR)
         cov[m, 1, 1] = max(p11 + velocity_var, VARIANCE_FLOOR)
-        cov[m, 2, 2] = max(cov[m, 2, 2] + yaw_var, VARIANCE_FLOOR)
+        cov[m, 2, 2] = max(c22 + yaw_var, VARIANCE_FLOOR)
         cov[m, 0, 1] = cov[m, 1, 0] = p01
         cov[m, 0, 2] = cov[m, 2, 0] = p02
         cov[m, 1, 2] = cov[m, 2, 1] = p12

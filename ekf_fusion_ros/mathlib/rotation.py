@@ -10,7 +10,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ekf_fusion_ros.kernels.compile import four
 from ekf_fusion_ros.kernels.compile import kernel
+from ekf_fusion_ros.kernels.compile import three
 
 Array = NDArray[np.float64]
 
@@ -18,8 +20,8 @@ Array = NDArray[np.float64]
 @kernel
 def quat_multiply(p: Array, q: Array) -> Array:
     """Return the Hamilton product p q, (4,)."""
-    p0, p1, p2, p3 = p[0], p[1], p[2], p[3]
-    q0, q1, q2, q3 = q[0], q[1], q[2], q[3]
+    p0, p1, p2, p3 = four(p)
+    q0, q1, q2, q3 = four(q)
     return np.array((
         p0 * q0 - p1 * q1 - p2 * q2 - p3 * q3,
         p0 * q1 + p1 * q0 + p2 * q3 - p3 * q2,
@@ -37,17 +39,19 @@ def quat_inverse(q: Array) -> Array:
 @kernel
 def quat_normalise(q: Array) -> Array:
     """Return q / |q|, (4,)."""
-    return q / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    q0, q1, q2, q3 = four(q)
+    return q / math.sqrt(q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
 
 
 @kernel
 def quat_from_rotation_vector(r: Array) -> Array:
     """Return the quaternion of a rotation vector (3,) in rad; identity below 1e-10 rad."""
-    angle = math.sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2])
+    r0, r1, r2 = three(r)
+    angle = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
     if angle < 1e-10:
         return np.array((1.0, 0.0, 0.0, 0.0))
     s = math.sin(0.5 * angle) / angle
-    return np.array((math.cos(0.5 * angle), s * r[0], s * r[1], s * r[2]))
+    return np.array((math.cos(0.5 * angle), s * r0, s * r1, s * r2))
 
 
 @kernel
@@ -63,7 +67,7 @@ def rotation_vector_from_quat(q: Array) -> Array:
 @kernel
 def matrix_from_quat(q: Array) -> Array:
     """Return the rotation matrix (3, 3) in the homogeneous form, quadratic in q."""
-    q0, q1, q2, q3 = q[0], q[1], q[2], q[3]
+    q0, q1, q2, q3 = four(q)
     a, b, c, d = q0 * q0, q1 * q1, q2 * q2, q3 * q3
     rot = np.empty((3, 3))
     rot[0, 0] = a + b - c - d
