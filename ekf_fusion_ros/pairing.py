@@ -38,10 +38,13 @@ class FixPairing:
         self._velocities.append(velocity)
         return [self._pair(velocity)] if self._matches(velocity) else []
 
+    @property
+    def waiting(self) -> bool:
+        """True while a fix or a velocity waits for its partner."""
+        return self._fix is not None or bool(self._velocities)
+
     def advance(self, now_us: int) -> Sequence[GnssSample]:
         """Return the fix whose wait is over at inertial time `now_us`."""
-        if self._fix is None and not self._velocities:
-            return ()
         limit = now_us - self._wait_us
         while self._velocities and self._velocities[0].time_us < limit - self._tolerance_us:
             self._drop(self._velocities.pop(0))

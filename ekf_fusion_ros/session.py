@@ -79,6 +79,7 @@ class FusionSession:
         self._decoders = {role: decoder_of(role, self.params) for role in self._statistics}
         self._inertial_role = IMU if roles is None or IMU in roles else ODOMETRY
         self._local = self._is_local()
+        self._gap_notice = self.params.session.gap_notice
         self._rate_mhz = round(1000 * self.params.session.output_rate)
         self._last_altitude = 0.0
         self.restarts = 0
@@ -123,15 +124,30 @@ class FusionSession:
         Never raises for a bad message: it is counted by reason. Raises KeyError for a role that
         the session was not made for.
         """
+        return self.take(role, self.decode(role, message))
+
+    def decode(self, role: str, message: Any) -> Any:
+        """Return what a message says, for `take`: a stamped sample, or why it is refused.
+
+        It neither changes the session nor hangs on its state, so messages may be decoded ahead.
+        """
+        try:
+            return self._decoders[role](message)
+        except Refused as refusal:
+            return refusal
+
+    def take(self, role: str, decoded: Any) -> list[FusedOutput]:
+        """Take what `decode` returned, or a Refused of the caller; return the outputs due."""
         statistics = self._statistics[role]
         statistics.received += 1
         try:
-            sample = self._decoders[role](message)
-            self._judge_order(role, sample.time_us)
+            if isinstance(decoded, Refused):
+                raise decoded
+            self._judge_order(role, decoded.time_us)
         except Refused as refusal:
             self._count_refusal(role, refusal.reason, refusal.detail)
             return []
-        return self._accept(role, sample)
+        return self._accept(role, decoded)
 
     def push(self, sample: Sample) -> list[FusedOutput]:
         """Take one sample and return the outputs that are due.
@@ -190,10 +206,13 @@ class FusionSession:
             return
         before = self._inertial_order.last
         step = self._inertial_order.judge(time_us)
-        gap = 0.0 if before is None else (time_us - before) / SECOND_US
-        if step is Step.FORWARD and gap > self.params.session.gap_notice:
-            self._tell(time_us, f'no {role} message for {gap:.3f} s')
-        if step is Step.RESTART:
+        if before is None:
+            return
+        gap = (time_us - before) / SECOND_US
+        if step is Step.FORWARD:
+            if gap > self._gap_notice:
+                self._tell(time_us, f'no {role} message for {gap:.3f} s')
+        elif step is Step.RESTART:
             self._tell(time_us, f'the stamps of {role} jumped by {gap:+.3f} s: the estimator '
                        'starts again')
             self._restart()
@@ -262,11 +281,12 @@ class FusionSession:
         increments = self._inertial.push(reading)
         if role == ODOMETRY:
             self._push_odometry(reading)
+        holding, pairing = self._holding, self._pairing
         for imu in increments:
-            for due in self._holding.release(imu.time_us):
+            for due in holding.release(imu.time_us):
                 self._aid(*due)
-            if self._pairing is not None:
-                for fix in self._pairing.advance(imu.time_us):
+            if pairing is not None and pairing.waiting:
+                for fix in pairing.advance(imu.time_us):
                     self._push_fix(fix)
             outputs += self._advance(imu)
         return outputs

@@ -37,6 +37,7 @@ class InertialOrder:
 
     def __init__(self, jump_us: int) -> None:
         self._jump_us = jump_us
+        self._sure_us = min(jump_us, PAUSE_US)
         self._suspect: int | None = None
         self._step = jump_us
         self.last: int | None = None
@@ -47,6 +48,9 @@ class InertialOrder:
             self.last = time_us
             return Step.FIRST
         step = time_us - self.last
+        if 0 < step <= self._sure_us:
+            self.last, self._step, self._suspect = time_us, step, None
+            return Step.FORWARD
         if -self._jump_us <= step <= 0:
             check_advance(time_us, self.last)
         restart = abs(step) > self._jump_us

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
 from typing import Any
 from typing import NamedTuple
@@ -11,8 +12,12 @@ from numpy.typing import NDArray
 
 from ekf_fusion_ros import frames
 from ekf_fusion_ros.messages import fields
+from ekf_fusion_ros.messages.flat import FlatMessage
+from ekf_fusion_ros.messages.flat import elements
+from ekf_fusion_ros.messages.flat import flat_message
+from ekf_fusion_ros.messages.flat import xyz
 from ekf_fusion_ros.messages.refusal import Refused
-from ekf_fusion_ros.messages.stamps import stamp_of
+from ekf_fusion_ros.messages.stamps import checked_stamp
 from ekf_fusion_ros.params.messages import FixMessageParams
 from ekf_fusion_ros.params.messages import MessageParams
 from ekf_fusion_ros.samples import GnssSample
@@ -22,6 +27,10 @@ Array = NDArray[np.float64]
 # NavSatStatus to PX4's fix types: 3-D, differential, RTK.
 FIX_TYPES = {0: 3, 1: 4, 2: 6}
 NO_FIX = -1
+
+# Places in the flat messages: NavSatFix, then the twists of both kinds.
+STATUS, POSITION, POSITION_COVARIANCE, COVARIANCE_TYPE = 0, slice(2, 5), slice(5, 14), 14
+LINEAR, TWIST_COVARIANCE = slice(0, 3), slice(6, 42)
 
 COVARIANCE_UNKNOWN = 0
 COVARIANCE_KNOWN = 3
@@ -45,9 +54,10 @@ def decode_fix(message: Any, params: MessageParams) -> GnssSample:
     A NaN altitude stays NaN: latitude and longitude are good without it. Satellites and PDOP are
     None, since NavSatFix has none. Raises Refused.
     """
-    time_us = stamp_of(message)
-    fix_type = _fix_type(message.status.status)
-    lat, lon, alt = message.latitude, message.longitude, message.altitude
+    flat = message if isinstance(message, FlatMessage) else _flat_fix(message)
+    time_us = checked_stamp(flat.sec, flat.nanosec)
+    fix_type = _fix_type(int(flat.numbers[STATUS]))
+    lat, lon, alt = flat.numbers[POSITION]
     fields.check_finite((lat, lon), 'latitude, longitude')
     if abs(lat) > 90.0:
         raise Refused('bad_latitude', f'latitude is {lat:g} deg: beyond 90')
@@ -57,7 +67,8 @@ def decode_fix(message: Any, params: MessageParams) -> GnssSample:
         raise Refused('zero_position', 'latitude and longitude are both 0: not a fix')
     if abs(alt) > MAX_ALTITUDE:
         raise Refused('bad_altitude', f'altitude is {alt:g} m: beyond {MAX_ALTITUDE:g}')
-    eph, epv = accuracies(message, params.fix)
+    eph, epv = accuracies(
+        int(flat.numbers[COVARIANCE_TYPE]), flat.numbers[POSITION_COVARIANCE], params.fix)
     return GnssSample(
         time_us, float(lat), float(lon), float(alt), eph, epv, fix_type=fix_type)
 
@@ -68,15 +79,15 @@ def decode_fix_velocity(message: Any, params: MessageParams) -> FixVelocity:
     The velocity is ENU unless the frame name ends in _ned. The accuracy is that of the worst
     axis. Raises Refused.
     """
-    time_us = stamp_of(message)
-    stamped = message.twist
-    covariance = getattr(stamped, 'covariance', None)
-    linear = stamped.linear if covariance is None else stamped.twist.linear
-    velocity = fields.vector(linear, 'twist.linear', MAX_VELOCITY)
-    if frames.frame_kind(message.header.frame_id) == 'enu':
+    flat = message if isinstance(message, FlatMessage) else _flat_twist(message)
+    time_us = checked_stamp(flat.sec, flat.nanosec)
+    linear, covariance = flat.numbers[LINEAR], flat.numbers[TWIST_COVARIANCE]
+    fields.check_vector(linear, 'twist.linear', MAX_VELOCITY)
+    velocity = np.array(linear, np.float64)
+    if frames.frame_kind(flat.frame_id) == 'enu':
         velocity = frames.swap_enu_ned(velocity)
     variance = 0.0
-    if covariance is not None:
+    if covariance:
         fields.check_variances(covariance, (0, 7, 14), 'twist.covariance')
         variance = float(max(covariance[0], covariance[7], covariance[14]))
     if variance >= UNMEASURED_VARIANCE:
@@ -86,19 +97,18 @@ def decode_fix_velocity(message: Any, params: MessageParams) -> FixVelocity:
     return FixVelocity(time_us, velocity, max(accuracy, params.fix_velocity.min_accuracy))
 
 
-def accuracies(message: Any, params: FixMessageParams) -> tuple[float, float]:
+def accuracies(
+        kind: int, covariance: Sequence[float], params: FixMessageParams) -> tuple[float, float]:
     """Return the horizontal and vertical 1-sigma accuracy of a NavSatFix in m.
 
-    By `position_covariance_type`: UNKNOWN gives the defaults whatever the matrix holds;
+    By its `position_covariance_type`: UNKNOWN gives the defaults whatever the matrix holds;
     APPROXIMATED and DIAGONAL_KNOWN give the larger horizontal variance and the vertical one;
     KNOWN gives the major axis of the horizontal error ellipse. A zero variance means unknown.
     """
-    kind = message.position_covariance_type
     if kind == COVARIANCE_UNKNOWN:
         return params.default_eph, params.default_epv
     if not COVARIANCE_UNKNOWN < kind <= COVARIANCE_KNOWN:
         raise Refused('bad_covariance', f'position_covariance_type is {kind}: not 0 to 3')
-    covariance = message.position_covariance
     fields.check_variances(covariance, (0, 4, 8), 'position_covariance')
     east, north, up = float(covariance[0]), float(covariance[4]), float(covariance[8])
     horizontal = max(east, north)
@@ -109,6 +119,22 @@ def accuracies(message: Any, params: FixMessageParams) -> tuple[float, float]:
     eph = math.sqrt(horizontal) or params.default_eph
     epv = math.sqrt(up) or params.default_epv
     return max(eph, params.min_eph), max(epv, params.min_epv)
+
+
+def _flat_fix(message: Any) -> FlatMessage:
+    covariance = elements(message.position_covariance, 9, 'position_covariance')
+    return flat_message(message, (
+        message.status.status, message.status.service, message.latitude, message.longitude,
+        message.altitude, *covariance, message.position_covariance_type))
+
+
+def _flat_twist(message: Any) -> FlatMessage:
+    covariance: list[float] = []
+    twist = message.twist
+    if hasattr(twist, 'covariance'):
+        covariance = elements(twist.covariance, 36, 'twist.covariance')
+        twist = twist.twist
+    return flat_message(message, (*xyz(twist.linear), *xyz(twist.angular), *covariance))
 
 
 def _fix_type(status: int) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 from typing import NamedTuple
 
@@ -11,10 +12,15 @@ from numpy.typing import NDArray
 from ekf_fusion_ros import frames
 from ekf_fusion_ros.mathlib.rotation import quat_multiply
 from ekf_fusion_ros.messages import fields
+from ekf_fusion_ros.messages.flat import FlatMessage
+from ekf_fusion_ros.messages.flat import elements
+from ekf_fusion_ros.messages.flat import flat_message
+from ekf_fusion_ros.messages.flat import xyz
+from ekf_fusion_ros.messages.flat import xyzw
 from ekf_fusion_ros.messages.mounting import body_to_sensor_quaternion
 from ekf_fusion_ros.messages.mounting import sensor_to_body
 from ekf_fusion_ros.messages.refusal import Refused
-from ekf_fusion_ros.messages.stamps import stamp_of
+from ekf_fusion_ros.messages.stamps import checked_stamp
 from ekf_fusion_ros.params.messages import ZERO
 from ekf_fusion_ros.params.messages import ImuMessageParams
 from ekf_fusion_ros.params.messages import MessageParams
@@ -23,6 +29,10 @@ from ekf_fusion_ros.samples import ImuSample
 Array = NDArray[np.float64]
 
 ABSENT = -1.0
+# Places in the flat message, each vector before its covariance.
+ORIENTATION, ORIENTATION_COVARIANCE = slice(0, 4), 4
+RATE, RATE_COVARIANCE = slice(13, 16), 16
+FORCE, FORCE_COVARIANCE = slice(25, 28), 28
 
 
 class ImuReading(NamedTuple):
@@ -44,15 +54,30 @@ def decode_imu(message: Any, params: MessageParams) -> ImuReading:
     unknown. An orientation that is not a rotation counts as absent. Raises Refused, also where
     the angular velocity or the acceleration is absent.
     """
-    time_us = stamp_of(message)
-    _check_present(message.angular_velocity_covariance, 'angular_velocity')
-    _check_present(message.linear_acceleration_covariance, 'linear_acceleration')
-    rate = fields.vector(message.angular_velocity, 'angular_velocity', params.imu.max_rate)
-    force = fields.vector(
-        message.linear_acceleration, 'linear_acceleration', params.imu.max_acceleration)
-    rotation = sensor_to_body(params.imu.mount_rpy, message.header.frame_id)
-    orientation = _orientation(message, params.imu)
+    flat = message if isinstance(message, FlatMessage) else _flat(message)
+    sec, nanosec, frame_id, numbers, _ = flat
+    imu = params.imu
+    time_us = checked_stamp(sec, nanosec)
+    _check_present(numbers, RATE_COVARIANCE, 'angular_velocity')
+    _check_present(numbers, FORCE_COVARIANCE, 'linear_acceleration')
+    rate, force = numbers[RATE], numbers[FORCE]
+    fields.check_vector(rate, 'angular_velocity', imu.max_rate)
+    fields.check_vector(force, 'linear_acceleration', imu.max_acceleration)
+    rotation = sensor_to_body(imu.mount_rpy, frame_id)
+    orientation = None
+    if numbers[ORIENTATION_COVARIANCE] != ABSENT:
+        orientation = _orientation(numbers[ORIENTATION], frame_id, imu)
     return ImuReading(time_us, rotation.dot(rate), rotation.dot(force), orientation)
+
+
+def _flat(message: Any) -> FlatMessage:
+    numbers: list[float] = []
+    for name, values in (('orientation', xyzw), ('angular_velocity', xyz),
+                         ('linear_acceleration', xyz)):
+        covariance = f'{name}_covariance'
+        numbers += values(getattr(message, name))
+        numbers += elements(getattr(message, covariance), 9, covariance)
+    return flat_message(message, numbers)
 
 
 class ImuIntegrator:
@@ -97,23 +122,23 @@ class ImuIntegrator:
         return ImuSample(reading.time_us, reading.rate * dt, reading.specific_force * dt, dt, dt)
 
 
-def _check_present(covariance: Any, name: str) -> None:
-    if covariance[0] >= 0.0 and covariance[4] >= 0.0 and covariance[8] >= 0.0:
+def _check_present(numbers: Sequence[float], first: int, name: str) -> None:
+    if numbers[first] >= 0.0 and numbers[first + 4] >= 0.0 and numbers[first + 8] >= 0.0:
         return
+    covariance = numbers[first:first + 9]
     if covariance[0] == ABSENT:
         raise Refused(
             f'no_{name}', f'{name}_covariance[0] is -1: the message carries no {name}')
     fields.check_variances(covariance, (0, 4, 8), f'{name}_covariance')
 
 
-def _orientation(message: Any, params: ImuMessageParams) -> Array | None:
-    if message.orientation_covariance[0] == ABSENT:
-        return None
+def _orientation(
+        xyzw: Sequence[float], frame_id: str, params: ImuMessageParams) -> Array | None:
     try:
-        quaternion = fields.unit_quaternion(message.orientation, 'orientation')
+        quaternion = fields.unit_quaternion(xyzw, 'orientation')
     except Refused:
         return None
-    if frames.frame_kind(message.header.frame_id) == 'enu':
+    if frames.frame_kind(frame_id) == 'enu':
         quaternion = frames.swap_attitude(quaternion)
     if params.mount_rpy != ZERO:
         quaternion = quat_multiply(quaternion, body_to_sensor_quaternion(params.mount_rpy))

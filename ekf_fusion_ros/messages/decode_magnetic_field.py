@@ -5,23 +5,34 @@ from __future__ import annotations
 from typing import Any
 
 from ekf_fusion_ros.messages import fields
+from ekf_fusion_ros.messages.flat import FlatMessage
+from ekf_fusion_ros.messages.flat import elements
+from ekf_fusion_ros.messages.flat import flat_message
+from ekf_fusion_ros.messages.flat import xyz
 from ekf_fusion_ros.messages.mounting import sensor_to_body
 from ekf_fusion_ros.messages.refusal import Refused
-from ekf_fusion_ros.messages.stamps import stamp_of
+from ekf_fusion_ros.messages.stamps import checked_stamp
 from ekf_fusion_ros.params.messages import MessageParams
 from ekf_fusion_ros.samples import MagSample
 
 GAUSS_PER_TESLA = 1e4
+# Places in the flat message.
+FIELD, COVARIANCE = slice(0, 3), slice(3, 12)
 
 
 def decode_magnetic_field(message: Any, params: MessageParams) -> MagSample:
     """Return a MagneticField (tesla) as Gauss in body FRD. Raises Refused."""
-    time_us = stamp_of(message)
-    fields.check_variances(
-        message.magnetic_field_covariance, (0, 4, 8), 'magnetic_field_covariance')
-    tesla = fields.vector(
-        message.magnetic_field, 'magnetic_field (in tesla)', params.magnetic_field.max_field)
-    if not (tesla[0] or tesla[1] or tesla[2]):
+    flat = message if isinstance(message, FlatMessage) else _flat(message)
+    time_us = checked_stamp(flat.sec, flat.nanosec)
+    tesla = flat.numbers[FIELD]
+    fields.check_variances(flat.numbers[COVARIANCE], (0, 4, 8), 'magnetic_field_covariance')
+    fields.check_vector(tesla, 'magnetic_field (in tesla)', params.magnetic_field.max_field)
+    if not any(tesla):
         raise Refused('zero_field', 'magnetic_field is all zero: the sensor does not measure')
-    rotation = sensor_to_body(params.magnetic_field.mount_rpy, message.header.frame_id)
+    rotation = sensor_to_body(params.magnetic_field.mount_rpy, flat.frame_id)
     return MagSample(time_us, GAUSS_PER_TESLA * rotation.dot(tesla))
+
+
+def _flat(message: Any) -> FlatMessage:
+    covariance = elements(message.magnetic_field_covariance, 9, 'magnetic_field_covariance')
+    return flat_message(message, (*xyz(message.magnetic_field), *covariance))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
 from typing import Any
 
@@ -11,10 +12,15 @@ from numpy.typing import NDArray
 from ekf_fusion_ros import frames
 from ekf_fusion_ros.mathlib.rotation import quat_multiply
 from ekf_fusion_ros.messages import fields
+from ekf_fusion_ros.messages.flat import FlatMessage
+from ekf_fusion_ros.messages.flat import elements
+from ekf_fusion_ros.messages.flat import flat_message
+from ekf_fusion_ros.messages.flat import xyz
+from ekf_fusion_ros.messages.flat import xyzw
 from ekf_fusion_ros.messages.mounting import body_to_sensor_quaternion
 from ekf_fusion_ros.messages.mounting import sensor_to_body
 from ekf_fusion_ros.messages.refusal import Refused
-from ekf_fusion_ros.messages.stamps import stamp_of
+from ekf_fusion_ros.messages.stamps import checked_stamp
 from ekf_fusion_ros.params.messages import ZERO
 from ekf_fusion_ros.params.messages import MessageParams
 from ekf_fusion_ros.params.messages import OdometryMessageParams
@@ -24,6 +30,10 @@ from ekf_fusion_ros.samples import VelocityFrame
 from ekf_fusion_ros.samples import VisionSample
 
 Array = NDArray[np.float64]
+
+# Places in the flat message; the twist is linear and angular velocity.
+POSITION, ORIENTATION, POSE_COVARIANCE = slice(0, 3), slice(3, 7), slice(7, 43)
+LINEAR, TWIST, TWIST_COVARIANCE = slice(43, 46), slice(43, 49), slice(49, 85)
 
 MAX_POSITION = 1e8
 MAX_VELOCITY = 1e3
@@ -43,12 +53,14 @@ def decode_odometry(message: Any, params: MessageParams) -> VisionSample:
     not measured beside a measured x is 0 with `lateral_velocity_noise`. Raises Refused.
     """
     odometry = params.odometry
-    time_us = stamp_of(message)
-    kind = parent_kind(message.header.frame_id, odometry)
-    flat = fields.flat_covariance(message.pose.covariance, 'pose.covariance')
-    position, position_var = _position(message, flat, kind, odometry)
-    quaternion, angular_var = _orientation(message, flat, kind, odometry)
-    velocity, velocity_cov = _velocity(message, odometry)
+    flat = message if isinstance(message, FlatMessage) else _flat(message)
+    time_us = checked_stamp(flat.sec, flat.nanosec)
+    kind = parent_kind(flat.frame_id, odometry)
+    pose_cov = flat.numbers[POSE_COVARIANCE]
+    fields.check_covariance(pose_cov, 'pose.covariance')
+    position, position_var = _position(flat, pose_cov, kind, odometry)
+    quaternion, angular_var = _orientation(flat, pose_cov, kind, odometry)
+    velocity, velocity_cov = _velocity(flat, odometry)
     if math.isnan(position[0]) and math.isnan(quaternion[0]) and math.isnan(velocity[0]):
         raise Refused(
             'not_measured', 'all variances say that nothing was measured: neither position nor '
@@ -78,16 +90,25 @@ def has_true_heading(params: OdometryMessageParams) -> bool:
     return params.true_heading or params.frame == 'ned'
 
 
+def _flat(message: Any) -> FlatMessage:
+    pose, twist = message.pose, message.twist
+    return flat_message(message, (
+        *xyz(pose.pose.position), *xyzw(pose.pose.orientation),
+        *elements(pose.covariance, 36, 'pose.covariance'),
+        *xyz(twist.twist.linear), *xyz(twist.twist.angular),
+        *elements(twist.covariance, 36, 'twist.covariance')), message.child_frame_id)
+
+
 def _position(
-        message: Any, flat: list[float], kind: str,
+        flat: FlatMessage, pose_cov: Sequence[float], kind: str,
         params: OdometryMessageParams) -> tuple[Array, Array]:
     covariance, measured = fields.measured_block(
-        flat, 0, POSITION_PRIMARY, params.position_noise ** 2, params.unmeasured_variance,
+        pose_cov, 0, POSITION_PRIMARY, params.position_noise ** 2, params.unmeasured_variance,
         'pose.covariance')
     if not (measured[0] and measured[1]):
         return NAN3, np.full(3, params.unmeasured_variance)
-    position = fields.vector(
-        message.pose.pose.position, 'pose.pose.position', MAX_POSITION, measured)
+    position = np.array(fields.measured_vector(
+        flat.numbers[POSITION], measured, 'pose.pose.position', MAX_POSITION), np.float64)
     variance = covariance.diagonal().copy()
     if kind == 'enu':
         position = frames.swap_enu_ned(position)
@@ -99,16 +120,15 @@ def _position(
 
 
 def _orientation(
-        message: Any, flat: list[float], kind: str,
+        flat: FlatMessage, pose_cov: Sequence[float], kind: str,
         params: OdometryMessageParams) -> tuple[Array, float]:
     covariance, measured = fields.measured_block(
-        flat, 3, ROTATION_PRIMARY, params.yaw_noise ** 2, params.unmeasured_variance,
+        pose_cov, 3, ROTATION_PRIMARY, params.yaw_noise ** 2, params.unmeasured_variance,
         'pose.covariance')
     if not measured[2]:
         return NAN4, params.unmeasured_variance
-    quaternion = fields.unit_quaternion(
-        message.pose.pose.orientation, 'pose.pose.orientation')
-    child_is_flu = frames.frame_kind(message.child_frame_id) == 'enu'
+    quaternion = fields.unit_quaternion(flat.numbers[ORIENTATION], 'pose.pose.orientation')
+    child_is_flu = frames.frame_kind(flat.child_frame_id) == 'enu'
     if kind == 'enu' and child_is_flu:
         quaternion = frames.swap_attitude(quaternion)
     elif kind == 'enu':
@@ -122,26 +142,22 @@ def _orientation(
     return quaternion, float(covariance[2, 2])
 
 
-def _velocity(message: Any, params: OdometryMessageParams) -> tuple[Array, Array]:
-    twist = message.twist
-    flat = fields.flat_covariance(twist.covariance, 'twist.covariance')
+def _velocity(flat: FlatMessage, params: OdometryMessageParams) -> tuple[Array, Array]:
+    twist_cov = flat.numbers[TWIST_COVARIANCE]
+    fields.check_covariance(twist_cov, 'twist.covariance')
     covariance, measured = fields.measured_block(
-        flat, 0, VELOCITY_PRIMARY, params.velocity_noise ** 2, params.unmeasured_variance,
+        twist_cov, 0, VELOCITY_PRIMARY, params.velocity_noise ** 2, params.unmeasured_variance,
         'twist.covariance')
-    if not measured[0] or (not any(flat) and _is_blank(twist.twist)):
+    # A twist that was never filled in is all zero.
+    if not measured[0] or not (any(twist_cov) or any(flat.numbers[TWIST])):
         return NAN3, params.unmeasured_variance * np.eye(3)
-    velocity = fields.vector(twist.twist.linear, 'twist.twist.linear', MAX_VELOCITY, measured)
+    velocity = fields.measured_vector(
+        flat.numbers[LINEAR], measured, 'twist.twist.linear', MAX_VELOCITY)
     for axis in (1, 2):
         if not measured[axis]:
             covariance[axis, axis] = params.lateral_velocity_noise ** 2
-    rotation = sensor_to_body(params.mount_rpy, message.child_frame_id)
+    rotation = sensor_to_body(params.mount_rpy, flat.child_frame_id)
     return rotation.dot(velocity), frames.rotate_covariance(covariance, rotation)
-
-
-def _is_blank(twist: Any) -> bool:
-    """True where neither linear nor angular velocity was ever filled in."""
-    linear, angular = twist.linear, twist.angular
-    return not any((linear.x, linear.y, linear.z, angular.x, angular.y, angular.z))
 
 
 def _levelled(quaternion: Array) -> Array:

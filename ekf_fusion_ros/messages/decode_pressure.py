@@ -6,17 +6,20 @@ import math
 from typing import Any
 
 from ekf_fusion_ros.geo.atmosphere import pressure_altitude
+from ekf_fusion_ros.messages.flat import FlatMessage
+from ekf_fusion_ros.messages.flat import flat_message
 from ekf_fusion_ros.messages.refusal import Refused
-from ekf_fusion_ros.messages.stamps import stamp_of
+from ekf_fusion_ros.messages.stamps import checked_stamp
 from ekf_fusion_ros.params.messages import MessageParams
 from ekf_fusion_ros.samples import BaroSample
 
 
 def decode_pressure(message: Any, params: MessageParams) -> BaroSample:
     """Return a FluidPressure (Pa) as pressure altitude. Raises Refused."""
-    time_us = stamp_of(message)
+    flat = message if isinstance(message, FlatMessage) else _flat(message)
+    time_us = checked_stamp(flat.sec, flat.nanosec)
     limits = params.pressure
-    pressure = message.fluid_pressure
+    pressure = flat.numbers[0]
     if not math.isfinite(pressure):
         raise Refused('not_finite', f'fluid_pressure is {pressure}: not finite')
     if not limits.min_pressure <= pressure <= limits.max_pressure:
@@ -24,3 +27,7 @@ def decode_pressure(message: Any, params: MessageParams) -> BaroSample:
             'out_of_range',
             f'fluid_pressure is {pressure:g}: not the pressure of air in Pa (hPa or mbar?)')
     return BaroSample(time_us, pressure_altitude(float(pressure)))
+
+
+def _flat(message: Any) -> FlatMessage:
+    return flat_message(message, (message.fluid_pressure, message.variance))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,39 +12,47 @@ from ekf_fusion_ros.messages.refusal import Refused
 
 Array = NDArray[np.float64]
 Mask = tuple[bool, bool, bool]
+Triple = Sequence[float]
 
 QUATERNION_NORM_ERROR = 0.1
 
 
-def vector(value: Any, name: str, limit: float, measured: Mask | None = None) -> Array:
-    """Return x, y, z of a field as (3,), 0 for axes that are not measured, whatever they hold.
-
-    Raises Refused 'not_finite', or 'out_of_range' when an element is beyond `limit`.
-    """
-    x, y, z = value.x, value.y, value.z
-    if measured is not None and not all(measured):
-        x, y, z = (e if known else 0.0 for e, known in zip((x, y, z), measured, strict=True))
+def check_vector(vector: Triple, name: str, limit: float) -> None:
+    """Raise Refused 'not_finite', or 'out_of_range' when an element is beyond `limit`."""
+    x, y, z = vector
     # One comparison catches NaN too.
     if not (-limit <= x <= limit and -limit <= y <= limit and -limit <= z <= limit):
-        check_finite((x, y, z), name)
+        check_finite(vector, name)
         raise Refused('out_of_range', f'{name} is ({x:g}, {y:g}, {z:g}): beyond {limit:g}')
-    return np.array((x, y, z), dtype=np.float64)
 
 
-def check_finite(values: Any, name: str) -> None:
+def measured_vector(vector: Triple, measured: Mask, name: str, limit: float) -> Triple:
+    """Return x, y, z of a field, 0 for axes that are not measured, whatever they hold.
+
+    Raises Refused as `check_vector` does.
+    """
+    if not all(measured):
+        x, y, z = (e if known else 0.0 for e, known in zip(vector, measured, strict=True))
+        vector = x, y, z
+    check_vector(vector, name, limit)
+    return vector
+
+
+def check_finite(values: Sequence[float], name: str) -> None:
     """Raise Refused 'not_finite' unless all values are finite."""
     if not all(map(math.isfinite, values)):
         numbers = ', '.join(f'{value:g}' for value in values)
         raise Refused('not_finite', f'{name} is ({numbers}): not finite')
 
 
-def unit_quaternion(value: Any, name: str) -> Array:
-    """Return an orientation field as (4,) w, x, y, z of unit length.
+def unit_quaternion(xyzw: Sequence[float], name: str) -> Array:
+    """Return an orientation field, in the order of the message, as (4,) w, x, y, z of length 1.
 
     Raises Refused 'not_finite', 'zero_quaternion', or 'bad_quaternion' when its length is more
     than 0.1 away from 1; smaller errors are normalised.
     """
-    elements = (value.w, value.x, value.y, value.z)
+    x, y, z, w = xyzw
+    elements = (w, x, y, z)
     norm = math.hypot(*elements)
     if abs(norm - 1.0) <= QUATERNION_NORM_ERROR:
         return np.array(elements, dtype=np.float64) / norm
@@ -54,7 +62,7 @@ def unit_quaternion(value: Any, name: str) -> Array:
     raise Refused('bad_quaternion', f'{name} has length {norm:g} instead of 1')
 
 
-def check_variances(covariance: Any, indices: tuple[int, ...], name: str) -> None:
+def check_variances(covariance: Sequence[float], indices: tuple[int, ...], name: str) -> None:
     """Raise Refused 'nan_covariance' or 'negative_covariance' for bad diagonal elements."""
     for index in indices:
         variance = covariance[index]
@@ -63,26 +71,20 @@ def check_variances(covariance: Any, indices: tuple[int, ...], name: str) -> Non
             raise Refused(reason, f'{name}[{index}] is {variance:g}: a variance must be 0 or more')
 
 
-def flat_covariance(covariance: Any, name: str) -> list[float]:
-    """Return a 6x6 row-major covariance field as 36 numbers.
+def check_covariance(flat: Sequence[float], name: str) -> None:
+    """Check the 36 numbers of a 6x6 row-major covariance.
 
-    Raises Refused 'bad_covariance' when there are not 36, 'nan_covariance' for any NaN and
-    'negative_covariance' for a negative variance.
+    Raises Refused 'nan_covariance' for any NaN and 'negative_covariance' for a negative variance.
     """
-    flat = list(covariance) if isinstance(covariance, tuple) \
-        else np.asarray(covariance, dtype=np.float64).ravel().tolist()
-    if len(flat) != 36:
-        raise Refused('bad_covariance', f'{name} has {len(flat)} elements, not 36')
     # The sum is NaN with any element, and far quicker than 36 tests.
     if math.isnan(sum(flat)) and any(map(math.isnan, flat)):
         raise Refused('nan_covariance', f'{name} holds NaN')
     if min(flat[::7]) < 0.0:
         raise Refused('negative_covariance', f'{name} has a negative variance')
-    return flat
 
 
 def measured_block(
-        flat: list[float], first: int, primary: Mask, default: float, limit: float,
+        flat: Sequence[float], first: int, primary: Mask, default: float, limit: float,
         name: str) -> tuple[Array, Mask]:
     """Return the covariance (3, 3) of the measured axes and which of the axes are measured.
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from ekf_fusion_ros.messages.refusal import Refused
 
 SECOND_US = 1_000_000
@@ -21,19 +19,18 @@ def seconds_nanoseconds(time_us: int) -> tuple[int, int]:
     return sec, rest * 1000
 
 
-def stamp_of(message: Any) -> int:
+def checked_stamp(sec: int, nanosec: int) -> int:
     """Return the header stamp of a message in integer microseconds.
 
     Raises Refused 'zero_stamp' for a stamp that is zero or negative, 'bad_stamp' for nanoseconds
     that fill a second or more.
     """
-    stamp = message.header.stamp
-    if not 0 <= stamp.nanosec < NANOSECONDS:
+    if not 0 <= nanosec < NANOSECONDS:
         raise Refused(
-            'bad_stamp', f'header.stamp.nanosec is {stamp.nanosec}: must be less than 1000000000')
-    time_us = microseconds(stamp.sec, stamp.nanosec)
+            'bad_stamp', f'header.stamp.nanosec is {nanosec}: must be less than 1000000000')
+    time_us = sec * SECOND_US + (nanosec + 500) // 1000
     if time_us <= 0:
         raise Refused(
             'zero_stamp',
-            f'header.stamp is {stamp.sec}.{stamp.nanosec:09d}: the driver must stamp its messages')
+            f'header.stamp is {sec}.{nanosec:09d}: the driver must stamp its messages')
     return time_us

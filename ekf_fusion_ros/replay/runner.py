@@ -13,6 +13,7 @@ from functools import cache
 import gc
 from itertools import chain
 from itertools import islice
+from itertools import takewhile
 import sys
 from threading import Timer
 import time
@@ -24,6 +25,7 @@ from tqdm import tqdm
 from ekf_fusion_ros.estimator import Event
 from ekf_fusion_ros.fused_output import FusedOutput
 from ekf_fusion_ros.inputs import ROLE_OF_SAMPLE
+from ekf_fusion_ros.messages.flat import FlatMessage
 from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.messages.stamps import microseconds
 from ekf_fusion_ros.params import Params
@@ -33,6 +35,7 @@ from ekf_fusion_ros.replay.sinks import AlignmentSink
 from ekf_fusion_ros.replay.sinks import BagSink
 from ekf_fusion_ros.replay.sinks import StateSink
 from ekf_fusion_ros.replay.sinks import TrajectorySink
+from ekf_fusion_ros.replay.storage import Message
 from ekf_fusion_ros.replay.storage import Recording
 from ekf_fusion_ros.replay.storage import RecordingError
 from ekf_fusion_ros.replay.summary import summarise
@@ -214,42 +217,49 @@ def _bag_steps(
 ) -> Iterator[list[FusedOutput]]:
     """Hand the messages to the session, yielding the outputs that are due."""
     session, withholding, options = run.session, run.withholding, run.options
-    last_ns = None if options.end is None else recording.start_ns + round(1e9 * options.end)
-    for time_ns, role, message in _bag_messages(recording, choice, options):
-        if last_ns is not None and time_ns >= last_ns:
-            break
-        if isinstance(message, Refused):
-            session.refuse(role, message.reason, message.detail)
-            continue
-        if role in withholding.roles and withholding.holds(role, _stamp_us(message)):
-            session.refuse(role, 'withheld')
-            continue
-        outputs = session.handle(role, message)
-        if outputs:
-            yield outputs
-
-
-def _bag_messages(
-    recording: Recording, choice: Choice, options: ReplayOptions,
-) -> Iterator[tuple[int, str, Any]]:
-    """Yield log time in ns, role and message, or why its bytes are none."""
-    roles = {topic.name: (role, topic.type, reader_of(topic.type))
-             for role, topic in choice.topics.items()}
-    first_ns = recording.start_ns + round(1e9 * options.start)
+    decode = {topic.name: _decoder(role, topic.type, session, withholding)
+              for role, topic in choice.topics.items()}
     total = sum(topic.count for topic in choice.topics.values())
-    for batch in _batches(recording.messages(roles), total, options.progress):
-        for time_ns, name, data in batch:
-            if time_ns >= first_ns:
-                role, kind, read = roles[name]
-                yield time_ns, role, _decoded(data, kind, read)
+    messages = _between(recording, recording.messages(decode), options)
+    for batch in _batches(messages, total, options.progress):
+        decoded = [decode[name](data) for _, name, data in batch]
+        for role, sample in decoded:
+            outputs = session.take(role, sample)
+            if outputs:
+                yield outputs
 
 
-def _decoded(data: bytes, kind: str, read: Callable[[bytes], Any]) -> Any:
-    try:
-        return read(data)
-    except Exception as error:
-        # Damaged bytes can make the decoder raise anything.
-        return Refused('undecodable', f'{len(data)} bytes are no {kind} ({error})')
+def _between(
+    recording: Recording, messages: Iterator[Message], options: ReplayOptions,
+) -> Iterator[Message]:
+    """Yield the messages from start to end of the options, by log time."""
+    first_ns = recording.start_ns + round(1e9 * options.start)
+    if options.start:
+        messages = filter(lambda message: message[0] >= first_ns, messages)
+    if options.end is None:
+        return messages
+    last_ns = recording.start_ns + round(1e9 * options.end)
+    return takewhile(lambda message: message[0] < last_ns, messages)
+
+
+def _decoder(
+    role: str, kind: str, session: FusionSession, withholding: Withholding,
+) -> Callable[[bytes], tuple[str, Any]]:
+    """Return what turns the bytes of a topic into its role and a sample or Refused."""
+    read, decode = reader_of(kind), session.decode
+    withheld = role in withholding.roles
+
+    def decoded(data: bytes) -> tuple[str, Any]:
+        try:
+            message = read(data)
+        except Exception as error:
+            # Damaged bytes can make the reader raise anything.
+            return role, Refused('undecodable', f'{len(data)} bytes are no {kind} ({error})')
+        if withheld and withholding.holds(role, _stamp_us(message)):
+            return role, Refused('withheld', '')
+        return role, decode(role, message)
+
+    return decoded
 
 
 def _csv_steps(run: _Run) -> Iterator[list[FusedOutput]]:
@@ -301,5 +311,5 @@ def _batches(items: Iterator[Any], total: int | None, shown: bool) -> Iterator[l
 
 
 def _stamp_us(message: Any) -> int:
-    stamp = message.header.stamp
+    stamp = message if isinstance(message, FlatMessage) else message.header.stamp
     return microseconds(stamp.sec, stamp.nanosec)

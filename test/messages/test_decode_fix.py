@@ -76,8 +76,8 @@ def test_altitude_may_be_missing(build):
 
 
 @pytest.mark.parametrize(('field', 'value', 'reason'), [
-    ('status', SimpleNamespace(status=-1), 'no_fix'),
-    ('status', SimpleNamespace(status=-2), 'unknown_status'),
+    ('status', SimpleNamespace(status=-1, service=1), 'no_fix'),
+    ('status', SimpleNamespace(status=-2, service=1), 'unknown_status'),
     ('latitude', math.nan, 'not_finite'),
     ('longitude', math.inf, 'not_finite'),
     ('latitude', -2e7, 'bad_latitude'),

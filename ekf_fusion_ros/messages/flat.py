@@ -1,0 +1,53 @@
+"""A message as its decoder takes it: header and numbers, without objects inside objects.
+
+A recording's bytes give this form at once; a message of rclpy or rosbags is flattened first. The
+rules of the decoders work on it, so that they exist once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+from typing import NamedTuple
+
+import numpy as np
+
+from ekf_fusion_ros.messages.refusal import Refused
+
+
+class FlatMessage(NamedTuple):
+    """Stamp, frame and all numbers of a message in the order of its definition.
+
+    numbers: in the units of the message, strings left out; each decoder names the places.
+    """
+
+    sec: int
+    nanosec: int
+    frame_id: str
+    numbers: Sequence[float]
+    child_frame_id: str = ''
+
+
+def flat_message(message: Any, numbers: Sequence[float], child_frame_id: str = '') -> FlatMessage:
+    """Return the numbers of a message under its header."""
+    header = message.header
+    return FlatMessage(
+        int(header.stamp.sec), int(header.stamp.nanosec), header.frame_id, numbers, child_frame_id)
+
+
+def xyz(vector: Any) -> tuple[float, float, float]:
+    """Return the elements of a Vector3 or Point."""
+    return vector.x, vector.y, vector.z
+
+
+def xyzw(quaternion: Any) -> tuple[float, float, float, float]:
+    """Return the elements of a Quaternion in the order of the message."""
+    return quaternion.x, quaternion.y, quaternion.z, quaternion.w
+
+
+def elements(array: Any, count: int, name: str) -> list[float]:
+    """Return the elements of an array field; raise Refused 'bad_covariance' unless `count`."""
+    flat: list[float] = np.asarray(array, dtype=np.float64).ravel().tolist()
+    if len(flat) != count:
+        raise Refused('bad_covariance', f'{name} has {len(flat)} elements, not {count}')
+    return flat
