@@ -5,6 +5,7 @@ Layout: OMG CDR as ROS 2 uses it; alignment counts from the byte after the encap
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 import struct
 
@@ -15,35 +16,39 @@ from ekf_fusion_ros.messages.encode import OdometryFields
 from ekf_fusion_ros.messages.stamps import seconds_nanoseconds
 
 ENCAPSULATION = b'\x00\x01\x00\x00'
+_STAMP = struct.Struct('<4siI')
 
 
 def odometry_cdr(fields: OdometryFields) -> bytes:
     """Return nav_msgs/msg/Odometry."""
-    head = _odometry_head(fields.frame_id, fields.child_frame_id)
-    sec, nanosec = seconds_nanoseconds(fields.time_us)
     return b''.join((
-        ENCAPSULATION, struct.pack('<iI', sec, nanosec), head,
-        struct.pack('<7d', *fields.position, *fields.orientation),
-        np.asarray(fields.pose_covariance, '<f8').tobytes(),
-        struct.pack('<6d', *fields.linear, *fields.angular),
-        np.asarray(fields.twist_covariance, '<f8').tobytes()))
+        _STAMP.pack(ENCAPSULATION, *seconds_nanoseconds(fields.time_us)),
+        _odometry_head(fields.frame_id, fields.child_frame_id),
+        np.asarray(fields.numbers, '<f8').tobytes()))
 
 
 def fix_cdr(fields: NavSatFixFields) -> bytes:
     """Return sensor_msgs/msg/NavSatFix."""
-    sec, nanosec = seconds_nanoseconds(fields.time_us)
-    head = _string(fields.frame_id) + struct.pack('<b', fields.status)
-    head = _aligned(_aligned(head, 2) + struct.pack('<H', fields.service), 8)
-    return b''.join((
-        ENCAPSULATION, struct.pack('<iI', sec, nanosec), head,
-        struct.pack('<3d', fields.latitude, fields.longitude, fields.altitude),
-        np.asarray(fields.position_covariance, '<f8').tobytes(),
-        struct.pack('<B', fields.position_covariance_type)))
+    pack, frame = _fix_layout(fields.frame_id)
+    return pack(
+        ENCAPSULATION, *seconds_nanoseconds(fields.time_us), frame, fields.status, fields.service,
+        fields.latitude, fields.longitude, fields.altitude, *fields.position_covariance.tolist(),
+        fields.position_covariance_type)
 
 
 @lru_cache(maxsize=8)
 def _odometry_head(frame_id: str, child_frame_id: str) -> bytes:
     return _aligned(_aligned(_string(frame_id), 4) + _string(child_frame_id), 8)
+
+
+@lru_cache(maxsize=8)
+def _fix_layout(frame_id: str) -> tuple[Callable[..., bytes], bytes]:
+    """Return what packs a fix, and its frame's name as it takes it."""
+    frame = _string(frame_id)
+    at = len(frame)
+    gap = -(at + 1) % 2
+    tail = -(at + 1 + gap + 2) % 8
+    return struct.Struct(f'<4siI{at}sb{gap}xH{tail}x12dB').pack, frame
 
 
 def _string(text: str) -> bytes:

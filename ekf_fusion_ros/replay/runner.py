@@ -183,11 +183,9 @@ class _Run:
     def _flush(self) -> None:
         """Write the rows that have gathered."""
         rows, self._rows = self._rows, []
-        for output in rows:
-            self._track.write(output)
-        if self._bag is not None:
-            for output in rows:
-                self._bag.write(output)
+        self._track.write([output.nav for output in rows])
+        if self._bag is not None and rows:
+            self._bag.write(rows)
 
     def finish(self, choice: Choice, say: Say) -> dict[str, Any]:
         """Write summary.json and say the gist of it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
 from pathlib import Path
 import shutil
@@ -13,11 +14,14 @@ from rosbags.rosbag2 import Writer
 from rosbags.typesys import Stores
 from rosbags.typesys import get_typestore
 
+from ekf_fusion_ros.estimator import GeoPoint
+from ekf_fusion_ros.estimator import NavState
 from ekf_fusion_ros.fused_output import FusedOutput
 from ekf_fusion_ros.geo.projection import make_projection
+from ekf_fusion_ros.messages.encode import OdometryFields
 from ekf_fusion_ros.messages.encode import encode_fix
 from ekf_fusion_ros.messages.encode import encode_gnss_odometry
-from ekf_fusion_ros.messages.encode import encode_odometry
+from ekf_fusion_ros.messages.encode import odometry_numbers
 from ekf_fusion_ros.params import Params
 from ekf_fusion_ros.replay.cdr import fix_cdr
 from ekf_fusion_ros.replay.cdr import odometry_cdr
@@ -26,6 +30,7 @@ from ekf_fusion_ros.session import FusionSession
 HEADER = 't,x,y,z,qx,qy,qz,qw,vx,vy,vz,yaw,var_x,var_y,var_z,var_yaw'
 ODOMETRY = 'nav_msgs/msg/Odometry'
 NAV_SAT_FIX = 'sensor_msgs/msg/NavSatFix'
+HALF_SQRT = math.sqrt(0.5)
 
 
 class TrajectorySink:
@@ -37,16 +42,17 @@ class TrajectorySink:
         self._csv.write(HEADER + '\n')
         self.rows = 0
 
-    def write(self, output: FusedOutput) -> None:
-        """Add one row to each file."""
-        nav = output.nav
-        pose, rest = _pose(output), _velocity_and_variances(output)
-        sec, micro = divmod(nav.time_us, 1_000_000)
-        stamp = f'{sec}.{micro:06d}'
-        words = [repr(value) for value in pose]
-        self._tum.write(f'{stamp} {" ".join(words)}\n')
-        self._csv.write(f'{stamp},{",".join(words)},{",".join(map(repr, rest))}\n')
-        self.rows += 1
+    def write(self, navs: Sequence[NavState]) -> None:
+        """Add one row for each state to each file."""
+        tum, table = [], []
+        for nav in navs:
+            second, micro = divmod(nav.time_us, 1_000_000)
+            pose = f'{second}.{micro:06d},{",".join(map(repr, _pose(nav)))}'
+            tum.append(pose.replace(',', ' '))
+            table.append(f'{pose},{",".join(map(repr, _velocity_and_variances(nav)))}')
+        for stream, rows in ((self._tum, tum), (self._csv, table)):
+            stream.write('\n'.join([*rows, '']))
+        self.rows += len(navs)
 
     def close(self) -> None:
         """Finish the files."""
@@ -54,17 +60,15 @@ class TrajectorySink:
         self._csv.close()
 
 
-def _pose(output: FusedOutput) -> tuple[float, ...]:
+def _pose(nav: NavState) -> tuple[float, ...]:
     """Return x, y, z ENU and qx, qy, qz, qw FLU to ENU (frames.swap_attitude written out)."""
-    north, east, down = output.nav.position.tolist()
-    w, x, y, z = output.nav.quaternion.tolist()
-    half = math.sqrt(0.5)
-    return (east, north, -down,
-            half * (x + y), half * (x - y), half * (w - z), half * (w + z))
+    north, east, down = nav.position.tolist()
+    w, x, y, z = nav.quaternion.tolist()
+    return (east, north, -down, HALF_SQRT * (x + y), HALF_SQRT * (x - y), HALF_SQRT * (w - z),
+            HALF_SQRT * (w + z))
 
 
-def _velocity_and_variances(output: FusedOutput) -> tuple[float, ...]:
-    nav = output.nav
+def _velocity_and_variances(nav: NavState) -> tuple[float, ...]:
     north, east, down = nav.velocity.tolist()
     w, x, y, z = nav.quaternion.tolist()
     heading = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
@@ -116,13 +120,18 @@ class BagSink:
             topic: self._writer.add_connection(topic, kind, typestore=store)
             for topic, kind in topics.items()}
 
-    def write(self, output: FusedOutput) -> None:
-        """Add the messages of one output; log time is the stamp."""
+    def write(self, outputs: Sequence[FusedOutput]) -> None:
+        """Add the messages of some outputs; log time is the stamp."""
+        numbers = odometry_numbers([output.nav for output in outputs])
+        for output, row in zip(outputs, numbers, strict=True):
+            fields = OdometryFields(output.time_us, *self._frames, row)
+            self._put('/odometry/filtered', output.time_us, odometry_cdr(fields))
+            if not output.local and output.nav.origin is not None:
+                self._put_fixes(output, output.nav.origin)
+
+    def _put_fixes(self, output: FusedOutput, origin: GeoPoint) -> None:
+        """Add the position on the globe and the fixes that came with it."""
         nav, time_us = output.nav, output.time_us
-        self._put('/odometry/filtered', time_us, odometry_cdr(encode_odometry(nav, *self._frames)))
-        if output.local or nav.origin is None:
-            return
-        origin = nav.origin
         projection = make_projection(
             self._projection_name, origin.lat, origin.lon, origin.alt)
         fix = encode_fix(nav, projection, self._frames[1])
