@@ -33,9 +33,9 @@ def attitude_error_jacobian(q: Array) -> Array:
 
 
 @kernel
-def pose_covariance(q: Array, p: Array) -> Array:
-    """Return (6, 6): position NED, then small rotations about the earth axes."""
-    jacobian = attitude_error_jacobian(q)
+def pose_covariance(x: Array, p: Array) -> Array:
+    """Return (6, 6) of states and covariance: position NED, then rotations about earth axes."""
+    jacobian = attitude_error_jacobian(x)
     covariance = np.empty((6, 6))
     covariance[0:3, 0:3] = p[7:10, 7:10]
     turned = np.dot(jacobian, np.ascontiguousarray(p[0:4, 0:10]))
@@ -49,24 +49,25 @@ def nav_state(ekf: Ekf2) -> NavState:
     """Return the output predictor's state at the body origin."""
     f = ekf.filter
     out = f.output
-    q = out.now[0:4].copy()
-    velocity, position = out.now[4:7].copy(), out.now[7:10].copy()
+    now = out.now.copy()
+    velocity, position = now[4:7], now[7:10]
     if ekf.params.imu.position != ZERO:
         lever = np.asarray(ekf.params.imu.position)
         velocity, position = out.velocity_at_origin(lever), out.position_at_origin(lever)
     p = f.cov.p
     validity = ekf.control.validity
-    gyro_bias = f.x[10:13] / f.dt_avg
+    biases = f.x[10:16] / f.dt_avg
+    gyro_bias = biases[0:3]
     return NavState(
         time_us=f.t_now,
-        quaternion=q,
+        quaternion=now[0:4],
         velocity=velocity,
         position=position,
         angular_rate=out.rate - gyro_bias,
-        pose_cov=pose_covariance(f.x[0:4], p),
+        pose_cov=pose_covariance(f.x, p),
         velocity_cov=p[4:7, 4:7].copy(),
         gyro_bias=gyro_bias,
-        accel_bias=f.x[13:16] / f.dt_avg,
+        accel_bias=biases[3:6],
         origin=f.earth.origin(),
         yaw_aligned=f.flags.yaw_align,
         dead_reckoning=f.dead_reckoning,

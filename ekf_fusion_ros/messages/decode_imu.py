@@ -18,7 +18,7 @@ from ekf_fusion_ros.messages.flat import flat_message
 from ekf_fusion_ros.messages.flat import xyz
 from ekf_fusion_ros.messages.flat import xyzw
 from ekf_fusion_ros.messages.mounting import body_to_sensor_quaternion
-from ekf_fusion_ros.messages.mounting import sensor_to_body
+from ekf_fusion_ros.messages.mounting import turned_to_body
 from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.messages.stamps import checked_stamp
 from ekf_fusion_ros.params.messages import ZERO
@@ -42,8 +42,8 @@ class ImuReading(NamedTuple):
     """
 
     time_us: int
-    rate: Array
-    specific_force: Array
+    rate: Sequence[float]
+    specific_force: Sequence[float]
     orientation: Array | None = None
 
 
@@ -63,11 +63,12 @@ def decode_imu(message: Any, params: MessageParams) -> ImuReading:
     rate, force = numbers[RATE], numbers[FORCE]
     fields.check_vector(rate, 'angular_velocity', imu.max_rate)
     fields.check_vector(force, 'linear_acceleration', imu.max_acceleration)
-    rotation = sensor_to_body(imu.mount_rpy, frame_id)
     orientation = None
     if numbers[ORIENTATION_COVARIANCE] != ABSENT:
         orientation = _orientation(numbers[ORIENTATION], frame_id, imu)
-    return ImuReading(time_us, rotation.dot(rate), rotation.dot(force), orientation)
+    return ImuReading(
+        time_us, turned_to_body(rate, imu.mount_rpy, frame_id),
+        turned_to_body(force, imu.mount_rpy, frame_id), orientation)
 
 
 def _flat(message: Any) -> FlatMessage:
@@ -119,7 +120,11 @@ class ImuIntegrator:
         else:
             self._interval_us = step_us
         dt = step_us * 1e-6
-        return ImuSample(reading.time_us, reading.rate * dt, reading.specific_force * dt, dt, dt)
+        p, q, r = reading.rate
+        x, y, z = reading.specific_force
+        return ImuSample(
+            reading.time_us, np.array((p * dt, q * dt, r * dt)),
+            np.array((x * dt, y * dt, z * dt)), dt, dt)
 
 
 def _check_present(numbers: Sequence[float], first: int, name: str) -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from ekf_fusion_ros.messages import fields
 from ekf_fusion_ros.messages.flat import FlatMessage
 from ekf_fusion_ros.messages.flat import elements
 from ekf_fusion_ros.messages.flat import flat_message
 from ekf_fusion_ros.messages.flat import xyz
-from ekf_fusion_ros.messages.mounting import sensor_to_body
+from ekf_fusion_ros.messages.mounting import turned_to_body
 from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.messages.stamps import checked_stamp
 from ekf_fusion_ros.params.messages import MessageParams
@@ -29,8 +31,8 @@ def decode_magnetic_field(message: Any, params: MessageParams) -> MagSample:
     fields.check_vector(tesla, 'magnetic_field (in tesla)', params.magnetic_field.max_field)
     if not any(tesla):
         raise Refused('zero_field', 'magnetic_field is all zero: the sensor does not measure')
-    rotation = sensor_to_body(params.magnetic_field.mount_rpy, flat.frame_id)
-    return MagSample(time_us, GAUSS_PER_TESLA * rotation.dot(tesla))
+    x, y, z = turned_to_body(tesla, params.magnetic_field.mount_rpy, flat.frame_id)
+    return MagSample(time_us, GAUSS_PER_TESLA * np.array((x, y, z)))
 
 
 def _flat(message: Any) -> FlatMessage:

@@ -45,7 +45,7 @@ def slots(message):
 def numbers(sample):
     for name in getattr(sample, '_fields', sample.__slots__):
         value = getattr(sample, name)
-        if isinstance(value, np.ndarray | float):
+        if isinstance(value, np.ndarray | float | tuple):
             yield name, np.atleast_1d(value)
 
 
