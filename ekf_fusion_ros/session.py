@@ -140,9 +140,10 @@ class FusionSession:
         """Take what `decode` returned, or a Refused of the caller; return the outputs due."""
         statistics = self._statistics[role]
         statistics.received += 1
+        if isinstance(decoded, Refused):
+            self._count_refusal(role, decoded.reason, decoded.detail)
+            return []
         try:
-            if isinstance(decoded, Refused):
-                raise decoded
             self._judge_order(role, decoded.time_us)
         except Refused as refusal:
             self._count_refusal(role, refusal.reason, refusal.detail)
@@ -186,7 +187,8 @@ class FusionSession:
 
     def _push_directly(self, sample: Sample) -> list[FusedOutput]:
         if isinstance(sample, ImuSample):
-            return self._advance(sample)
+            output = self._advance(sample)
+            return [] if output is None else [output]
         if isinstance(sample, VisionSample):
             self._heading.push(sample)
         if isinstance(sample, GnssSample):
@@ -206,9 +208,7 @@ class FusionSession:
             return
         before = self._inertial_order.last
         step = self._inertial_order.judge(time_us)
-        if before is None:
-            return
-        gap = (time_us - before) / SECOND_US
+        gap = 0.0 if before is None else (time_us - before) / SECOND_US
         if step is Step.FORWARD:
             if gap > self._gap_notice:
                 self._tell(time_us, f'no {role} message for {gap:.3f} s')
@@ -288,32 +288,34 @@ class FusionSession:
             if pairing is not None and pairing.waiting:
                 for fix in pairing.advance(imu.time_us):
                     self._push_fix(fix)
-            outputs += self._advance(imu)
+            output = self._advance(imu)
+            if output is not None:
+                outputs.append(output)
         return outputs
 
-    def _advance(self, imu: ImuSample) -> list[FusedOutput]:
+    def _advance(self, imu: ImuSample) -> FusedOutput | None:
         """Step the estimator by one increment and return the output that is due, if any."""
         self._now_us = imu.time_us
         self._estimator.push(imu)
         if not self._estimator.update():
-            return []
+            return None
         if self._on_update is not None:
             self._on_update(self._estimator)
         # Rows stand at filter updates, so those of any rate are a subset of all updates.
         tick = imu.time_us * self._rate_mhz // 1_000_000_000
         if self._rate_mhz and tick == self._tick:
-            return []
+            return None
         self._tick = tick
         nav = self._estimator.nav_state()
         if nav is None:
-            return []
+            return None
         note_milestones(self.milestones, nav)
         if not self._local:
             nav = self._at_home(nav)
             if nav is None or not (nav.yaw_aligned and nav.gnss_started):
-                return []
+                return None
         fixes, self._fixes = tuple(self._fixes), []
-        return [FusedOutput(nav, self._local, fixes)]
+        return FusedOutput(nav, self._local, fixes)
 
     def _at_home(self, nav: NavState) -> NavState | None:
         """Return the state about the first origin, which restarts keep; None without one."""
