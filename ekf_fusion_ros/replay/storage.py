@@ -11,10 +11,13 @@ from pathlib import Path
 import shutil
 from tempfile import TemporaryDirectory
 
+from rosbags.interfaces import Connection
 from rosbags.rosbag2 import Reader
 import yaml
 
 from ekf_fusion_ros.replay.compression import zstd
+from ekf_fusion_ros.replay.mcap_chunks import chunk_messages
+from ekf_fusion_ros.replay.mcap_chunks import chunks_in_order
 from ekf_fusion_ros.replay.salvage import Salvage
 from ekf_fusion_ros.replay.salvage import salvage
 
@@ -196,8 +199,9 @@ class _IntactPart(_Part):
         connections = [one for one in self._reader.connections if one.topic in topics]
         last, missing = -1, sum(one.msgcount for one in connections)
         try:
-            for one, last, data in self._reader.messages(connections) if connections else ():
-                yield last, one.topic, data
+            for message in self._stream(connections) if connections else ():
+                yield message
+                last = message[0]
                 missing -= 1
             if missing > 0:
                 notes.append(f'{self._storage.name} is damaged: {missing} messages that it counts '
@@ -210,6 +214,15 @@ class _IntactPart(_Part):
         for message in found.messages:
             if message[0] > last and message[1] in topics:
                 yield message
+
+    def _stream(self, connections: list[Connection]) -> Iterator[Message]:
+        if self._storage.suffix == '.mcap':
+            chunks = chunks_in_order(self._storage)
+            if chunks:
+                topics = {one.id: one.topic for one in connections}
+                return chunk_messages(self._storage, chunks, topics)
+        return ((time_ns, one.topic, data)
+                for one, time_ns, data in self._reader.messages(connections))
 
     def close(self) -> None:
         self._reader.close()

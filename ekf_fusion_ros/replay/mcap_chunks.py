@@ -1,0 +1,97 @@
+"""Messages of an intact MCAP file, chunk by chunk, at a third of the cost of a general reader.
+
+Record layout: the MCAP specification, https://mcap.dev/spec.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from collections.abc import Mapping
+from itertools import pairwise
+import mmap
+from operator import itemgetter
+from pathlib import Path
+import struct
+import zlib
+
+from ekf_fusion_ros.replay.compression import zstd
+
+MESSAGE, CHUNK_INDEX = 5, 8
+FOOTER_SIZE = 37
+_HEAD = struct.Struct('<BQ').unpack_from
+_MESSAGE = struct.Struct('<H4xQ').unpack_from
+
+
+def chunks_in_order(path: Path) -> list[int]:
+    """Return where the chunks of a file begin; empty where they are not one after the other.
+
+    Only such a file can be read chunk by chunk. Raises struct.error for damaged bytes.
+    """
+    with path.open('rb') as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        index = sorted(_index(data))
+    ordered = all(before[1] <= after[0] for before, after in pairwise(index))
+    return [offset for _, _, offset in index] if ordered else []
+
+
+def chunk_messages(
+    path: Path, chunks: list[int], topics: Mapping[int, str],
+) -> Iterator[tuple[int, str, bytes]]:
+    """Yield (log time ns, topic, bytes) of the channels in `topics`, by log time.
+
+    Raises ValueError, struct.error or an error of the decompressor for a damaged chunk.
+    """
+    with path.open('rb') as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        for offset in chunks:
+            yield from sorted(_messages(_records(data, offset), topics), key=itemgetter(0))
+
+
+def _index(data: mmap.mmap) -> Iterator[tuple[int, int, int]]:
+    """Yield first and last log time and the offset of each chunk."""
+    at, = struct.unpack_from('<Q', data, len(data) - 28)
+    while 0 < at < len(data) - FOOTER_SIZE:
+        opcode, length = _HEAD(data, at)
+        if opcode == CHUNK_INDEX:
+            yield struct.unpack_from('<QQQ', data, at + 9)
+        at += 9 + length
+
+
+def _records(data: mmap.mmap, offset: int) -> bytes:
+    """Return the records of a chunk, decompressed and checked."""
+    size, crc, name_length = struct.unpack_from('<QII', data, offset + 9 + 16)
+    at = offset + 9 + 32 + name_length
+    compression = data[at - name_length:at].decode()
+    stored, = struct.unpack_from('<Q', data, at)
+    raw = _decompressed(compression, data[at + 8:at + 8 + stored])
+    if len(raw) != size:
+        raise ValueError(f'a chunk holds {len(raw)} bytes instead of {size}')
+    if crc and zlib.crc32(raw) != crc:
+        raise ValueError('the checksum of a chunk is wrong')
+    return raw
+
+
+def _decompressed(compression: str, data: bytes) -> bytes:
+    if compression == 'zstd':
+        return bytes(zstd.decompress(data))
+    if compression == 'lz4':
+        from lz4.frame import decompress
+        return bytes(decompress(data))
+    if compression:
+        raise ValueError(f'the compression {compression!r} of a chunk is not known')
+    return data
+
+
+def _messages(raw: bytes, topics: Mapping[int, str]) -> list[tuple[int, str, bytes]]:
+    found = []
+    at, size = 0, len(raw)
+    while at < size:
+        opcode, length = _HEAD(raw, at)
+        end = at + 9 + length
+        if end > size:
+            raise ValueError('a record of a chunk is cut short')
+        if opcode == MESSAGE:
+            channel, log_time = _MESSAGE(raw, at + 9)
+            topic = topics.get(channel)
+            if topic is not None:
+                found.append((log_time, topic, raw[at + 31:end]))
+        at = end
+    return found
