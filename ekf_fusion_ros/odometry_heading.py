@@ -14,27 +14,27 @@ class OdometryHeading:
     """Compares the attitude of the filter with that of the newest odometry message."""
 
     def __init__(self) -> None:
-        self._time_us = 0
-        self._yaw = math.nan
+        self._newest: VisionSample | None = None
 
     @property
     def known(self) -> bool:
         """True once an odometry sample has come."""
-        return self._time_us > 0
+        return self._newest is not None
 
     def push(self, sample: VisionSample) -> None:
-        """Note the attitude of an odometry sample; without one its axes are the body's."""
-        measured = math.isfinite(sample.quaternion[0])
-        self._time_us = sample.time_us
-        self._yaw = yaw_321(matrix_from_quat(sample.quaternion)) if measured else 0.0
+        """Note an odometry sample."""
+        self._newest = sample
 
     def estimate(self, nav: NavState) -> tuple[float, float] | None:
         """Return (odom_yaw, sigma) in rad with p_enu = Rz(odom_yaw) p_odom, None before data."""
-        if math.isnan(self._yaw):
+        newest = self._newest
+        if newest is None:
             return None
+        # Without an attitude the axes of the odometry are the body's.
+        measured = yaw_321(matrix_from_quat(newest.quaternion)) if newest.has_attitude else 0.0
         # The two attitudes differ by their stamps; the body rate bridges the gap.
         rot = matrix_from_quat(nav.quaternion)
         rate = float(rot[2] @ nav.angular_rate)
-        yaw = yaw_321(rot) - rate * (nav.time_us - self._time_us) * 1e-6
-        odom_yaw = math.remainder(self._yaw - yaw, 2.0 * math.pi)
+        yaw = yaw_321(rot) - rate * (nav.time_us - newest.time_us) * 1e-6
+        odom_yaw = math.remainder(measured - yaw, 2.0 * math.pi)
         return odom_yaw, math.sqrt(max(0.0, float(nav.pose_cov[5, 5])))
