@@ -17,7 +17,6 @@ from ekf_fusion_ros.params import with_overrides
 from ekf_fusion_ros.replay.options import ReplayOptions
 from ekf_fusion_ros.replay.runner import replay
 from ekf_fusion_ros.replay.storage import RecordingError
-from ekf_fusion_ros.roles import LATER
 from ekf_fusion_ros.roles import SUPPORTED
 
 DONE, UNUSABLE, WRONG_ARGUMENTS = 0, 1, 2
@@ -131,7 +130,7 @@ def _topics(texts: Sequence[str]) -> dict[str, str]:
     topics: dict[str, str] = {}
     for text in texts:
         role, name = _pair(text, '--topic', 'role=/name, or role= to keep the role out')
-        _check_role(role, '--topic', wanted=bool(name))
+        _check_role(role, '--topic')
         if role in topics:
             raise ValueError(f'--topic {text}: role {role} is given twice')
         topics[role] = name
@@ -142,7 +141,7 @@ def _windows(texts: Sequence[str]) -> dict[str, list[tuple[float, float]]]:
     windows: dict[str, list[tuple[float, float]]] = {}
     for text in texts:
         role, spans = _pair(text, '--withhold', 'role=S:E[,S:E...]')
-        _check_role(role, '--withhold', wanted=True)
+        _check_role(role, '--withhold')
         for span in spans.split(','):
             first, _, end = span.partition(':')
             try:
@@ -155,11 +154,8 @@ def _windows(texts: Sequence[str]) -> dict[str, list[tuple[float, float]]]:
     return windows
 
 
-def _check_role(role: str, option: str, *, wanted: bool) -> None:
-    if role in LATER:
-        if wanted:
-            raise ValueError(f'{option}: role {role} is not supported by this version')
-    elif role not in SUPPORTED:
+def _check_role(role: str, option: str) -> None:
+    if role not in SUPPORTED:
         raise ValueError(f'{option}: unknown role {role!r}; choose of {", ".join(SUPPORTED)}')
 
 

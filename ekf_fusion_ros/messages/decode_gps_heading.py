@@ -1,0 +1,82 @@
+"""Heading of a receiver with two antennas, told as a pose or an orientation, to readings."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+from typing import NamedTuple
+
+from ekf_fusion_ros import frames
+from ekf_fusion_ros.mathlib.angles import wrap_pi
+from ekf_fusion_ros.messages import fields
+from ekf_fusion_ros.messages.refusal import Refused
+from ekf_fusion_ros.messages.stamps import stamp_of
+from ekf_fusion_ros.params.messages import MessageParams
+
+ABSENT = -1.0
+POSE_YAW, IMU_YAW = 35, 8
+# As good as any direction: the variance of an angle that may be anything is pi^2 / 3.
+UNMEASURED_VARIANCE = math.pi ** 2 / 3.0
+STEEP = 0.1
+
+
+class FixHeading(NamedTuple):
+    """Heading of the vehicle by a receiver with two antennas.
+
+    yaw rad from north, clockwise; offset rad of the axis through the antennas from body forward,
+    clockwise; accuracy 1-sigma rad.
+    """
+
+    time_us: int
+    yaw: float
+    offset: float
+    accuracy: float
+
+
+def decode_gps_heading(message: Any, params: MessageParams) -> FixHeading:
+    """Return the yaw of a PoseWithCovarianceStamped, PoseStamped or Imu as a heading.
+
+    The orientation is against ENU unless the frame name ends in _ned or _frd; roll and pitch,
+    which two antennas do not measure, do not count. Raises Refused.
+    """
+    heading = params.gps_heading
+    time_us = stamp_of(message)
+    orientation, variance = _measured(message)
+    yaw = _yaw(orientation)
+    if frames.frame_kind(message.header.frame_id) == 'enu':
+        yaw = frames.swap_yaw_enu_ned(yaw)
+    offset = -heading.antenna_yaw
+    if heading.heading_of == 'antennas':
+        yaw = wrap_pi(yaw - offset)
+    accuracy = math.sqrt(variance) or heading.default_accuracy
+    return FixHeading(time_us, yaw, offset, max(accuracy, heading.min_accuracy))
+
+
+def _measured(message: Any) -> tuple[Any, float]:
+    """Return the orientation and the variance of its yaw, 0 where that is not told."""
+    if hasattr(message, 'orientation_covariance'):
+        covariance, index = message.orientation_covariance, IMU_YAW
+        if covariance[0] == ABSENT:
+            raise Refused('no_orientation', 'orientation_covariance[0] is -1: the message '
+                          'carries no orientation')
+        return message.orientation, _variance(covariance, index, 'orientation_covariance')
+    covariance = getattr(message.pose, 'covariance', None)
+    if covariance is None:
+        return message.pose.orientation, 0.0
+    return message.pose.pose.orientation, _variance(covariance, POSE_YAW, 'pose.covariance')
+
+
+def _variance(covariance: Any, index: int, name: str) -> float:
+    fields.check_variances(covariance, (index,), name)
+    variance = float(covariance[index])
+    if variance >= UNMEASURED_VARIANCE:
+        raise Refused('not_measured', f'{name}[{index}] is {variance:g} rad^2: no heading')
+    return variance
+
+
+def _yaw(orientation: Any) -> float:
+    w, x, y, z = fields.unit_quaternion(orientation, 'orientation').tolist()
+    ahead, aside = 1.0 - 2.0 * (y * y + z * z), 2.0 * (w * z + x * y)
+    if math.hypot(ahead, aside) < STEEP:
+        raise Refused('steep', 'the orientation points up or down: it has no heading')
+    return math.atan2(aside, ahead)
