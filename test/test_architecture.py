@@ -36,7 +36,10 @@ STRANGERS = ({'ekf2', 'lpe'}, {'node', 'replay'})
 FAMILIES = ({'magnetometer', 'magnetic_fusion'},)
 CORE = {part for parts in LAYERS[:7] for part in parts}
 
-MESSAGES = {'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'nav_msgs', 'sensor_msgs'}
+MESSAGES = {
+    'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'nav_msgs', 'sensor_msgs',
+    'std_msgs',
+}
 LIBRARIES = {
     'geo': {'pygeomag'},
     'params': {'yaml'},

@@ -70,7 +70,7 @@ def _parser() -> argparse.ArgumentParser:
     add('--end', type=_seconds, metavar='S', help='end S seconds after the start')
     add('--withhold', action='append', default=[], metavar='ROLE=S:E[,S:E...]',
         help='keep messages of a role from the filter in windows of stamps, in seconds after '
-        'the start; fix withholds fix_velocity too')
+        'the start; fix withholds fix_velocity and gps_heading too')
     add('--rate', type=float, metavar='HZ', help='rate of the outputs; 0 = every filter update')
     add('--log-states', action='store_true', help='write estimator.csv, a row a filter update')
     add('--no-bag', action='store_true', help='do not write the fused bag')

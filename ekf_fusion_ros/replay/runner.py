@@ -102,7 +102,8 @@ def make_kernels_ready() -> None:
 
 def _replay_bag(options: ReplayOptions, progress: Progress, say: Say) -> dict[str, Any]:
     with Recording(options.recording, ALL_TYPES) as recording:
-        choice = choose(recording.topics, options.topics, str(options.recording))
+        choice = choose(
+            recording.topics, options.topics, str(options.recording), _switched_on(options.params))
         told = list(recording.notes)
         for line in [*told, *choice.lines()]:
             say(line)
@@ -126,6 +127,12 @@ def _replay_csv(options: ReplayOptions, progress: Progress, say: Say) -> dict[st
     for note in progress.notes:
         say(note)
     return run.finish(Choice(), say)
+
+
+def _switched_on(params: Params) -> list[str]:
+    """Return the roles that parameters add; the node's usual ones say nothing."""
+    usual = Params().node.roles
+    return [role for role in params.node.roles if role not in usual]
 
 
 def _with_roles(params: Params, choice: Choice) -> Params:
@@ -221,7 +228,7 @@ def _bag_steps(
         if isinstance(message, Refused):
             session.refuse(role, message.reason, message.detail)
             continue
-        if role in withholding.roles and withholding.holds(role, _stamp_us(message)):
+        if role in withholding.roles and withholding.holds(role, _stamp_us(message, time_ns)):
             session.refuse(role, 'withheld')
             continue
         outputs = session.handle(role, message)
@@ -300,6 +307,9 @@ def _batches(items: Iterator[Any], total: int | None, shown: bool) -> Iterator[l
             bar.update(len(batch))
 
 
-def _stamp_us(message: Any) -> int:
+def _stamp_us(message: Any, log_time_ns: int) -> int:
+    """Return the stamp of a message, of one without a header the time it was logged."""
+    if not hasattr(message, 'header'):
+        return log_time_ns // 1000
     stamp = message.header.stamp
     return microseconds(stamp.sec, stamp.nanosec)
