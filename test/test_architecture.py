@@ -42,7 +42,7 @@ MESSAGES = {
 }
 LIBRARIES = {
     'geo': {'pygeomag'},
-    'params': {'yaml'},
+    'params': {'yaml', 'pyulog'},
     'kernels.compile': {'numba', 'scipy'},
     'node': {'rclpy', 'rcl_interfaces'} | MESSAGES,
     'replay': {'rosbags', 'tqdm', 'yaml', 'lz4', 'backports', 'compression'},

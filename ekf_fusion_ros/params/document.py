@@ -136,7 +136,7 @@ def _expanded_names() -> Iterator[tuple[str, str]]:
             yield name, f'{foreign} bit {index}'
     for foreign, (name, _) in px4.ENUMERATIONS.items():
         yield name, foreign
-    for table in (px4.SWITCHES, px4.MICROSECONDS, px4.SECONDS):
+    for table in (px4.SWITCHES, px4.MICROSECONDS, px4.SECONDS, px4.MILLISECONDS):
         for foreign, name in table.items():
             yield name, foreign
     for foreign, name in px4.AXES.items():

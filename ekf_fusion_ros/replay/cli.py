@@ -20,7 +20,6 @@ from ekf_fusion_ros.replay.storage import RecordingError
 from ekf_fusion_ros.roles import SUPPORTED
 
 DONE, UNUSABLE, WRONG_ARGUMENTS = 0, 1, 2
-UNUSED_SHOWN = 12
 EXAMPLES = """
 examples:
   replay flight/ --output out
@@ -60,7 +59,7 @@ def _parser() -> argparse.ArgumentParser:
         help='rosbag2 folder, .mcap, .db3 (plain or zstd), or sensor CSV (.csv, .csv.gz)')
     add('--output', type=Path, required=True, metavar='DIR', help='folder for the results')
     add('--params', type=Path, action='append', default=[], metavar='FILE',
-        help='ROS 2 YAML, PX4 .params or ECL params.txt; several in order')
+        help='ROS 2 YAML, PX4 .params or .ulg, or ECL params.txt; several in order')
     add('--set', action='append', default=[], metavar='NAME=VALUE', dest='overrides',
         help='one parameter by its dotted name; after all files')
     add('--topic', action='append', default=[], metavar='ROLE=/NAME', dest='topics',
@@ -112,9 +111,7 @@ def _params(files: Sequence[Path], overrides: Sequence[str]) -> _Loaded:
         found = load_file(path, loaded.params)
         loaded = replace(loaded, params=found.params, vehicle=loaded.vehicle | found.vehicle)
         if found.unused:
-            shown = ', '.join(found.unused[:UNUSED_SHOWN])
-            more = len(found.unused) - UNUSED_SHOWN
-            print(f'{path}: not used: {shown}' + (f' and {more} more' if more > 0 else ''))
+            print(f'{path}: not used: {", ".join(found.unused)}')
     values = dict(_pair(text, '--set', 'name=value') for text in overrides)
     return replace(loaded, params=with_overrides(loaded.params, values))
 
