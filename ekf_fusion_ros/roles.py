@@ -102,9 +102,8 @@ def _wanted(params: Params, roles: Collection[str]) -> dict[str, dict[str, Any]]
         }
     if GPS_HEADING in roles:
         wanted['gnss']['yaw'] = True
-    for role in (RANGE, FLOW, AIRSPEED):
-        if role in roles:
-            wanted[role] = {'enabled': True}
+    if FLOW in roles:
+        wanted['flow'] = {'enabled': True}
     if IMU not in roles:
         _add_odometry_as_imu(wanted)
     return wanted

@@ -104,17 +104,15 @@ class FusionSession:
         self._tick: int | None = None
         self._fixes: list[GnssSample] = []
         self._inertial_order = InertialOrder(round(SECOND_US * session.stamp_gap_max))
-        self._aiding_order = {role: self._new_order(role) for role in roles}
+        lead_us = round(SECOND_US * session.stamp_lead_max)
+        self._aiding_order = {
+            role: AidingOrder(lead_us, age_limit_us(self.params, role)) for role in roles}
         self._heading = OdometryHeading()
         self._holding = Holding(round(1000 * session.hold_ms))
         self._completion = Completion(self.params.messages)
         self._assembly = FixAssembly(self._statistics, roles, session)
         self._inertial = InertialInput(self.params, self._inertial_role) if roles else None
         self._motion = make_motion_heading(self.params, roles)
-
-    def _new_order(self, role: str) -> AidingOrder:
-        return AidingOrder(round(SECOND_US * self.params.session.stamp_lead_max),
-                           age_limit_us(self.params, role))
 
     def handle(self, role: str, message: Any) -> list[FusedOutput]:
         """Take one ROS message (of rosbags or rclpy) and return the outputs that are due.
