@@ -24,7 +24,8 @@ extras = {
     'fast': ['numba>=0.59', 'scipy'],
     'plot': ['matplotlib'],
     'geo': ['pygeomag'],
-    'test': ['pytest', 'hypothesis', 'scipy', 'pyproj', 'pymap3d', 'pygeomag'],
+    'ulog': ['pyulog'],
+    'test': ['pytest', 'hypothesis', 'scipy', 'pyproj', 'pymap3d', 'pygeomag', 'pyulog'],
     'dev': [
         'colcon-common-extensions',
         'mypy>=1.15',

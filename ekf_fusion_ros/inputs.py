@@ -9,19 +9,29 @@ from typing import TYPE_CHECKING
 from typing import Any
 
 from ekf_fusion_ros.estimator import Estimator
+from ekf_fusion_ros.messages.decode_airspeed import decode_airspeed
 from ekf_fusion_ros.messages.decode_fix import decode_fix
 from ekf_fusion_ros.messages.decode_fix import decode_fix_velocity
+from ekf_fusion_ros.messages.decode_flow import decode_flow
+from ekf_fusion_ros.messages.decode_gps_heading import decode_gps_heading
 from ekf_fusion_ros.messages.decode_imu import ImuIntegrator
 from ekf_fusion_ros.messages.decode_imu import decode_imu
+from ekf_fusion_ros.messages.decode_landed import decode_landed
 from ekf_fusion_ros.messages.decode_magnetic_field import decode_magnetic_field
 from ekf_fusion_ros.messages.decode_odometry import decode_odometry
 from ekf_fusion_ros.messages.decode_pressure import decode_pressure
+from ekf_fusion_ros.messages.decode_range import decode_range
+from ekf_fusion_ros.roles import AIRSPEED
 from ekf_fusion_ros.roles import FIX
 from ekf_fusion_ros.roles import FIX_VELOCITY
+from ekf_fusion_ros.roles import FLOW
+from ekf_fusion_ros.roles import GPS_HEADING
 from ekf_fusion_ros.roles import IMU
+from ekf_fusion_ros.roles import LANDED
 from ekf_fusion_ros.roles import MAGNETIC_FIELD
 from ekf_fusion_ros.roles import ODOMETRY
 from ekf_fusion_ros.roles import PRESSURE
+from ekf_fusion_ros.roles import RANGE
 from ekf_fusion_ros.samples import AirspeedSample
 from ekf_fusion_ros.samples import AuxVelocitySample
 from ekf_fusion_ros.samples import BaroSample
@@ -44,6 +54,11 @@ DECODERS: dict[str, Callable[..., Any]] = {
     IMU: decode_imu,
     MAGNETIC_FIELD: decode_magnetic_field,
     PRESSURE: decode_pressure,
+    RANGE: decode_range,
+    FLOW: decode_flow,
+    AIRSPEED: decode_airspeed,
+    LANDED: decode_landed,
+    GPS_HEADING: decode_gps_heading,
 }
 
 ROLE_OF_SAMPLE: dict[type, str] = {
@@ -52,11 +67,11 @@ ROLE_OF_SAMPLE: dict[type, str] = {
     VisionSample: ODOMETRY,
     MagSample: MAGNETIC_FIELD,
     BaroSample: PRESSURE,
-    RangeSample: 'range',
-    FlowSample: 'flow',
-    AirspeedSample: 'airspeed',
+    RangeSample: RANGE,
+    FlowSample: FLOW,
+    AirspeedSample: AIRSPEED,
     AuxVelocitySample: 'aux_velocity',
-    LandedSample: 'landed',
+    LandedSample: LANDED,
     HeadingSample: 'heading',
 }
 

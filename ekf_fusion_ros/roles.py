@@ -20,29 +20,47 @@ FIX_VELOCITY = 'fix_velocity'
 IMU = 'imu'
 MAGNETIC_FIELD = 'magnetic_field'
 PRESSURE = 'pressure'
+RANGE = 'range'
+FLOW = 'flow'
+AIRSPEED = 'airspeed'
+LANDED = 'landed'
+GPS_HEADING = 'gps_heading'
 
-SUPPORTED = (ODOMETRY, FIX, FIX_VELOCITY, IMU, MAGNETIC_FIELD, PRESSURE)
-LATER = ('range', 'flow', 'airspeed', 'landed', 'gps_heading')
+SUPPORTED = (
+    ODOMETRY, FIX, FIX_VELOCITY, IMU, MAGNETIC_FIELD, PRESSURE, RANGE, FLOW, AIRSPEED, LANDED,
+    GPS_HEADING)
+PARTS_OF_FIX = (FIX_VELOCITY, GPS_HEADING)
+"""Roles whose messages belong to the fix of the same stamp."""
+
+# Where ekf2 keeps the delay of a role.
+DELAYS = {
+    FIX: ('gnss', 'delay_ms'),
+    MAGNETIC_FIELD: ('mag', 'delay_ms'),
+    PRESSURE: ('baro', 'delay_ms'),
+    ODOMETRY: ('vision', 'delay_ms'),
+    RANGE: ('range', 'delay_ms'),
+    FLOW: ('flow', 'delay_ms'),
+    AIRSPEED: ('aiding', 'airspeed_delay_ms'),
+}
 
 
 def check_roles(roles: Collection[str]) -> None:
     """Raise ValueError for a set of roles that cannot be fused."""
     for role in roles:
-        if role in LATER:
-            raise ValueError(f'role {role} is not supported by this version: leave it out')
         if role not in SUPPORTED:
             raise ValueError(f'unknown role {role!r}: choose of {", ".join(SUPPORTED)}')
     if IMU not in roles and ODOMETRY not in roles:
         raise ValueError('no inertial input: give an odometry or an imu topic')
-    if FIX_VELOCITY in roles and FIX not in roles:
-        raise ValueError('role fix_velocity needs a fix topic beside it')
+    for role in PARTS_OF_FIX:
+        if role in roles and FIX not in roles:
+            raise ValueError(f'role {role} needs a fix topic beside it')
 
 
 def configure(params: Params, roles: Collection[str]) -> Params:
     """Return the parameters in effect for these roles.
 
     Only values of `params.ekf2` that stand at their default are changed, so that a value chosen
-    by the user wins.
+    by the user wins. What the estimator has no parameter for is not asked of it.
     """
     check_roles(roles)
     params = replace(params, ekf2=with_mounting(params.ekf2, params.messages))
@@ -50,10 +68,12 @@ def configure(params: Params, roles: Collection[str]) -> Params:
         return params
     ekf2 = params.ekf2
     for group, wanted in _wanted(params, roles).items():
-        current = getattr(ekf2, group)
+        current = getattr(ekf2, group, None)
+        if current is None:
+            continue
         default = type(current)()
-        changes = {name: value for name, value in wanted.items()
-                   if getattr(current, name) == getattr(default, name)}
+        changes = {name: value for name, value in wanted.items() if hasattr(current, name)
+                   and getattr(current, name) == getattr(default, name)}
         ekf2 = replace(ekf2, **{group: replace(current, **changes)})
     return replace(params, ekf2=ekf2)
 
@@ -67,7 +87,7 @@ def _wanted(params: Params, roles: Collection[str]) -> dict[str, dict[str, Any]]
     }
     if PRESSURE not in roles:
         wanted['height'] = {
-            'reference': 'gnss' if has_fix else 'vision', 'gnss_absolute': has_fix}
+            'reference': _height_without_pressure(roles), 'gnss_absolute': has_fix}
     if MAGNETIC_FIELD not in roles:
         wanted['mag'] = {'type': 'none'}
     if ODOMETRY in roles:
@@ -80,9 +100,19 @@ def _wanted(params: Params, roles: Collection[str]) -> dict[str, dict[str, Any]]
             'rotate': not own_frame,
             'delay_ms': params.session.odometry_delay_ms,
         }
+    if GPS_HEADING in roles:
+        wanted['gnss']['yaw'] = True
+    if FLOW in roles:
+        wanted['flow'] = {'enabled': True}
     if IMU not in roles:
         _add_odometry_as_imu(wanted)
     return wanted
+
+
+def _height_without_pressure(roles: Collection[str]) -> str:
+    if FIX in roles:
+        return 'gnss'
+    return 'vision' if ODOMETRY in roles or RANGE not in roles else 'range'
 
 
 def _add_odometry_as_imu(wanted: dict[str, dict[str, Any]]) -> None:
@@ -109,11 +139,10 @@ def age_limit_us(params: Params, role: str) -> int:
     The horizon takes a sample up to MAX_AGE_US after it has passed it; holding takes its share.
     """
     ekf2, session = params.ekf2, params.session
-    if role == FIX_VELOCITY:
+    if role in PARTS_OF_FIX:
         # it goes with its fix, and pairing tells which come too late for that
         return round(1e6 * session.stamp_age_max)
-    delays = {FIX: ekf2.gnss.delay_ms, MAGNETIC_FIELD: ekf2.mag.delay_ms,
-              PRESSURE: ekf2.baro.delay_ms, ODOMETRY: ekf2.vision.delay_ms}
+    delays = _delays_ms(params)
     horizon_ms = max(ekf2.timing.horizon_min_ms, *delays.values())
     usable_ms = horizon_ms - delays.get(role, 0.0) - session.hold_ms
     return min(round(1e6 * session.stamp_age_max), round(1e3 * usable_ms) + MAX_AGE_US)
@@ -121,6 +150,14 @@ def age_limit_us(params: Params, role: str) -> int:
 
 def _horizon_ms(params: Params) -> float:
     """Return a horizon behind every delay in use and the hold of the session."""
-    session, ekf2 = params.session, params.ekf2
-    delays = (ekf2.gnss.delay_ms, ekf2.mag.delay_ms, ekf2.baro.delay_ms, session.odometry_delay_ms)
-    return max(session.horizon_ms, max(delays) + 2.0 * session.hold_ms)
+    session = params.session
+    delays = {**_delays_ms(params), ODOMETRY: session.odometry_delay_ms}
+    return max(session.horizon_ms, max(delays.values()) + 2.0 * session.hold_ms)
+
+
+def _delays_ms(params: Params) -> dict[str, float]:
+    """Return the delays by role, of those that the estimator has."""
+    groups = {role: (getattr(params.ekf2, group, None), name)
+              for role, (group, name) in DELAYS.items()}
+    return {role: float(getattr(group, name)) for role, (group, name) in groups.items()
+            if hasattr(group, name)}

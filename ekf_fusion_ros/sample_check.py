@@ -48,6 +48,7 @@ def _gnss(sample: GnssSample) -> None:
     if abs(sample.lat) > 90.0:
         raise Refused('bad_latitude', f'latitude is {sample.lat:g} deg')
     _finite_or_absent('fix', sample.velocity)
+    _finite_or_absent('fix', sample.yaw)
     if math.isinf(sample.alt):
         raise Refused('not_finite', 'the altitude of a fix is infinite')
 
@@ -66,6 +67,42 @@ def _vision(sample: VisionSample) -> None:
     if sample.has_velocity:
         _finite('odometry', sample.velocity_cov)
         _variances('odometry', *sample.velocity_cov.diagonal())
+
+
+def _range(sample: RangeSample) -> None:
+    _finite('range', sample.distance, sample.min_distance, sample.max_distance)
+    if sample.distance < 0.0:
+        raise Refused('negative_range', f'a distance is {sample.distance:g} m')
+    if not 0.0 <= sample.min_distance < sample.max_distance:
+        raise Refused('bad_limits', f'a range finder measures from {sample.min_distance:g} to '
+                      f'{sample.max_distance:g} m')
+
+
+def _flow(sample: FlowSample) -> None:
+    _finite('flow', sample.flow)
+    if np.isinf(sample.gyro).any():
+        raise Refused('not_finite', 'the gyro of a flow sample is infinite')
+    if not (math.isfinite(sample.dt) and sample.dt > 0.0):
+        raise Refused('bad_interval', f'the interval of a flow sample is {sample.dt:g} s')
+    if not 0 <= sample.quality <= 255:
+        raise Refused('bad_quality', f'the quality of a flow sample is {sample.quality}')
+
+
+def _airspeed(sample: AirspeedSample) -> None:
+    _finite('airspeed', sample.true_airspeed, sample.eas2tas)
+    if sample.true_airspeed < 0.0 or sample.eas2tas <= 0.0:
+        raise Refused('negative_airspeed', f'a true airspeed is {sample.true_airspeed:g} m/s, '
+                      f'{sample.eas2tas:g} times the equivalent one')
+
+
+def _aux_velocity(sample: AuxVelocitySample) -> None:
+    _finite('aux_velocity', sample.velocity, sample.variance)
+    _variances('aux_velocity', *sample.variance)
+
+
+def _heading(sample: HeadingSample) -> None:
+    _finite('heading', sample.yaw, sample.variance)
+    _variances('heading', sample.variance)
 
 
 def _finite(name: str, *values: Any) -> None:
@@ -89,9 +126,9 @@ _CHECKS: dict[type, Callable[[Any], None]] = {
     VisionSample: _vision,
     MagSample: lambda sample: _finite('magnetic_field', sample.field),
     BaroSample: lambda sample: _finite('pressure', sample.altitude),
-    RangeSample: lambda sample: _finite('range', sample.distance),
-    FlowSample: lambda sample: _finite('flow', sample.flow, sample.dt),
-    AirspeedSample: lambda sample: _finite('airspeed', sample.true_airspeed, sample.eas2tas),
-    AuxVelocitySample: lambda sample: _finite('auxvel', sample.velocity, sample.variance),
-    HeadingSample: lambda sample: _finite('heading', sample.yaw, sample.variance),
+    RangeSample: _range,
+    FlowSample: _flow,
+    AirspeedSample: _airspeed,
+    AuxVelocitySample: _aux_velocity,
+    HeadingSample: _heading,
 }

@@ -51,7 +51,7 @@ class GnssSample:
 
     lat, lon deg; alt m in the datum of the source; velocity (3,) m/s NED; eph, epv 1-sigma m;
     sacc 1-sigma m/s; fix_type 3 = 3-D; nsats, pdop None where the source has none;
-    yaw rad of the vehicle from two antennas and the angle of their axis in the body.
+    yaw rad of the vehicle from two antennas, the angle of their axis in the body, and 1-sigma rad.
     """
 
     time_us: int
@@ -67,6 +67,7 @@ class GnssSample:
     pdop: float | None = None
     yaw: float = math.nan
     yaw_offset: float = 0.0
+    yaw_accuracy: float = math.nan
 
     @property
     def has_velocity(self) -> bool:
@@ -139,7 +140,12 @@ class RangeSample:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FlowSample:
-    """Optical flow: angle of the scene and of the body (3,), rad over `dt` s; quality 0..255."""
+    """Optical flow over the `dt` s before `time_us`.
+
+    flow (2,) rad: angle of the scene about body x and y (FRD); without rotation it is
+    (+v_right, -v_forward) / height * dt. gyro (3,) rad: minus the rotation of the body, NaN where
+    the sensor has no gyro. quality 0..255.
+    """
 
     time_us: int
     flow: Array

@@ -12,12 +12,14 @@ import math
 from typing import TYPE_CHECKING
 from typing import Any
 
+from ekf_fusion_ros.completion import Completion
 from ekf_fusion_ros.estimator import Estimator
 from ekf_fusion_ros.estimator import Event
 from ekf_fusion_ros.estimator import GeoPoint
 from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import HealthLevel
 from ekf_fusion_ros.estimator import NavState
+from ekf_fusion_ros.fix_assembly import FixAssembly
 from ekf_fusion_ros.fused_output import FusedOutput
 from ekf_fusion_ros.holding import Holding
 from ekf_fusion_ros.inputs import ROLE_OF_SAMPLE
@@ -27,16 +29,17 @@ from ekf_fusion_ros.inputs import make_estimator
 from ekf_fusion_ros.inputs import make_motion_heading
 from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.odometry_heading import OdometryHeading
-from ekf_fusion_ros.pairing import FixPairing
 from ekf_fusion_ros.roles import FIX
-from ekf_fusion_ros.roles import FIX_VELOCITY
 from ekf_fusion_ros.roles import IMU
+from ekf_fusion_ros.roles import LANDED
 from ekf_fusion_ros.roles import ODOMETRY
+from ekf_fusion_ros.roles import PARTS_OF_FIX
 from ekf_fusion_ros.roles import age_limit_us
 from ekf_fusion_ros.roles import configure
 from ekf_fusion_ros.sample_check import check_sample
 from ekf_fusion_ros.samples import GnssSample
 from ekf_fusion_ros.samples import ImuSample
+from ekf_fusion_ros.samples import LandedSample
 from ekf_fusion_ros.samples import Sample
 from ekf_fusion_ros.samples import VisionSample
 from ekf_fusion_ros.stamp_order import AidingOrder
@@ -85,6 +88,7 @@ class FusionSession:
         self.restarts = 0
         self._resets_before: Counter[str] = Counter()
         self._home: GeoPoint | None = None
+        self._landed: LandedSample | None = None
         self.milestones: dict[str, int] = {}
         self._forget()
 
@@ -101,22 +105,15 @@ class FusionSession:
         self._tick: int | None = None
         self._fixes: list[GnssSample] = []
         self._inertial_order = InertialOrder(round(SECOND_US * session.stamp_gap_max))
-        self._aiding_order = {role: self._new_order(role) for role in roles}
+        lead_us = round(SECOND_US * session.stamp_lead_max)
+        self._aiding_order = {
+            role: AidingOrder(lead_us, age_limit_us(self.params, role)) for role in roles}
         self._heading = OdometryHeading()
         self._holding = Holding(round(1000 * session.hold_ms))
-        self._pairing = self._new_pairing() if FIX_VELOCITY in roles else None
+        self._completion = Completion(self.params.messages)
+        self._assembly = FixAssembly(self._statistics, roles, session)
         self._inertial = InertialInput(self.params, self._inertial_role) if roles else None
         self._motion = make_motion_heading(self.params, roles)
-
-    def _new_order(self, role: str) -> AidingOrder:
-        return AidingOrder(round(SECOND_US * self.params.session.stamp_lead_max),
-                           age_limit_us(self.params, role))
-
-    def _new_pairing(self) -> FixPairing:
-        session = self.params.session
-        return FixPairing(self._statistics[FIX_VELOCITY],
-                          round(SECOND_US * session.pairing_tolerance),
-                          round(SECOND_US * session.pairing_wait))
 
     def handle(self, role: str, message: Any) -> list[FusedOutput]:
         """Take one ROS message (of rosbags or rclpy) and return the outputs that are due.
@@ -182,8 +179,7 @@ class FusionSession:
         """Take in what is still held or waits for a partner; after this the counts are exact."""
         for role, sample in self._holding.flush():
             self._aid(role, sample)
-        if self._pairing is not None:
-            self._push_fixes(self._pairing.flush())
+        self._push_fixes(self._assembly.flush())
 
     def _push_directly(self, sample: Sample) -> list[FusedOutput]:
         if isinstance(sample, ImuSample):
@@ -203,6 +199,8 @@ class FusionSession:
         self._judge_order(role, time_us)
 
     def _judge_order(self, role: str, time_us: int) -> None:
+        if role == LANDED:
+            return
         if role != self._inertial_role:
             self._aiding_order[role].judge(time_us, self._inertial_order.last)
             return
@@ -219,10 +217,14 @@ class FusionSession:
             self._inertial_order.judge(time_us)
 
     def _accept(self, role: str, sample: Any) -> list[FusedOutput]:
-        if role != FIX_VELOCITY:
+        if role not in PARTS_OF_FIX:
             self._statistics[role].accepted += 1
         if role == self._inertial_role:
             return self._run(role, sample)
+        if role == LANDED:
+            self._landed = sample
+            self._tell_landed()
+            return []
         if role == FIX:
             sample = self._with_height(sample)
         self._holding.push(role, sample)
@@ -239,15 +241,20 @@ class FusionSession:
 
     def _aid(self, role: str, sample: Any) -> None:
         """Hand an aiding sample to the estimator and to what looks for yaw in motion."""
-        if role == FIX_VELOCITY:
-            assert self._pairing is not None
-            self._push_fixes(self._pairing.push_velocity(sample))
+        if role in PARTS_OF_FIX:
+            self._push_fixes(self._assembly.push(role, sample))
         elif role == FIX:
-            self._push_fixes(self._pairing.push_fix(sample) if self._pairing else [sample])
+            self._completion.note_fix(sample)
+            self._push_fixes(self._assembly.push_fix(sample))
         elif role == ODOMETRY:
             self._push_odometry(sample)
         else:
-            self._estimator.push(sample)
+            self._estimator.push(self._completion.sample(sample))
+
+    def _tell_landed(self) -> None:
+        """Tell of ground contact, which acts at once, or as soon as there is inertial time."""
+        if self._landed is not None and self._now_us is not None:
+            self._estimator.push(replace(self._landed, time_us=self._now_us))
 
     def _push_odometry(self, sample: VisionSample) -> None:
         self._heading.push(sample)
@@ -281,13 +288,12 @@ class FusionSession:
         increments = self._inertial.push(reading)
         if role == ODOMETRY:
             self._push_odometry(reading)
-        holding, pairing = self._holding, self._pairing
+        holding, assembly = self._holding, self._assembly
         for imu in increments:
             for due in holding.release(imu.time_us):
                 self._aid(*due)
-            if pairing is not None and pairing.waiting:
-                for fix in pairing.advance(imu.time_us):
-                    self._push_fix(fix)
+            for fix in assembly.advance(imu.time_us):
+                self._push_fix(fix)
             output = self._advance(imu)
             if output is not None:
                 outputs.append(output)
@@ -295,8 +301,10 @@ class FusionSession:
 
     def _advance(self, imu: ImuSample) -> FusedOutput | None:
         """Step the estimator by one increment and return the output that is due, if any."""
-        self._now_us = imu.time_us
+        first, self._now_us = self._now_us is None, imu.time_us
         self._estimator.push(imu)
+        if first:
+            self._tell_landed()
         if not self._estimator.update():
             return None
         if self._on_update is not None:

@@ -22,8 +22,9 @@ LAYERS = (
     ('ekf2', 'lpe', 'health', 'odometry_imu', 'motion_heading'),
     ('messages',),
     (
-        'session', 'fused_output', 'holding', 'inputs', 'odometry_heading', 'pairing', 'roles',
-        'sample_check', 'stamp_order', 'statistics', 'warm_up',
+        'session', 'completion', 'fix_assembly', 'fused_output', 'holding', 'inputs',
+        'odometry_heading', 'pairing', 'roles', 'sample_check', 'stamp_order', 'statistics',
+        'warm_up',
     ),
     ('analysis',),
     ('node', 'replay'),
@@ -35,10 +36,13 @@ STRANGERS = ({'ekf2', 'lpe'}, {'node', 'replay'})
 FAMILIES = ({'magnetometer', 'magnetic_fusion'},)
 CORE = {part for parts in LAYERS[:7] for part in parts}
 
-MESSAGES = {'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'nav_msgs', 'sensor_msgs'}
+MESSAGES = {
+    'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'nav_msgs', 'sensor_msgs',
+    'std_msgs',
+}
 LIBRARIES = {
     'geo': {'pygeomag'},
-    'params': {'yaml'},
+    'params': {'yaml', 'pyulog'},
     'kernels.compile': {'numba', 'scipy'},
     'node': {'rclpy', 'rcl_interfaces'} | MESSAGES,
     'replay': {'rosbags', 'tqdm', 'yaml', 'lz4', 'backports', 'compression'},

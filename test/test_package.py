@@ -33,8 +33,8 @@ ROSDEP_KEYS = {
     'pyproj': 'python3-pyproj',
     'pytest': 'python3-pytest',
 }
-WITHOUT_KEY = {'pygeomag', 'backports', 'compression', 'setuptools'}
-"""pygeomag is optional; rosbags brings backports.zstd, Python 3.14 has it as compression."""
+WITHOUT_KEY = {'pygeomag', 'pyulog', 'backports', 'compression', 'setuptools'}
+"""pygeomag and pyulog are optional; rosbags brings backports.zstd, Python 3.14 has compression."""
 
 
 def third_party(folder: Path) -> set[str]:

@@ -79,7 +79,7 @@ def decode_fix_velocity(message: Any, params: MessageParams) -> FixVelocity:
     The velocity is ENU unless the frame name ends in _ned. The accuracy is that of the worst
     axis. Raises Refused.
     """
-    flat = message if isinstance(message, FlatMessage) else _flat_twist(message)
+    flat = message if isinstance(message, FlatMessage) else flat_twist(message)
     time_us = checked_stamp(flat.sec, flat.nanosec)
     linear, covariance = flat.numbers[LINEAR], flat.numbers[TWIST_COVARIANCE]
     fields.check_vector(linear, 'twist.linear', MAX_VELOCITY)
@@ -128,7 +128,8 @@ def _flat_fix(message: Any) -> FlatMessage:
         message.altitude, *covariance, message.position_covariance_type))
 
 
-def _flat_twist(message: Any) -> FlatMessage:
+def flat_twist(message: Any) -> FlatMessage:
+    """Return a TwistStamped or TwistWithCovarianceStamped flat."""
     covariance: list[float] = []
     twist = message.twist
     if hasattr(twist, 'covariance'):

@@ -67,12 +67,14 @@ def with_mounting(ekf2: Ekf2Params, messages: MessageParams) -> Ekf2Params:
         'imu': messages.imu.mount_xyz,
         'gnss': messages.fix.mount_xyz,
         'vision': messages.odometry.mount_xyz,
+        'range': messages.range.mount_xyz,
+        'flow': messages.flow.mount_xyz,
     }
     changes: dict[str, Any] = {}
     for group, (x, y, z) in arms.items():
         position = (x, -y, -z)
-        current = getattr(ekf2, group)
-        if position in (ZERO, current.position):
+        current = getattr(ekf2, group, None)
+        if position == ZERO or current is None or position == current.position:
             continue
         if current.position != ZERO:
             raise ValueError(

@@ -20,6 +20,8 @@ TROUBLE = {
     'internal_errors': 'internal errors, see the log',
     'stalls': 'times busy for long, inputs may be lost: is the computer overloaded?',
 }
+# Roles that need not speak while nothing changes.
+TOLD_ON_CHANGE = ('landed',)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +72,8 @@ class TopicWatch:
             'refused': str(counts.refused_total)}
         values.update({f'refused.{reason}': str(count) for reason, count in reasons})
         values.update({f'detail.{reason}': counts.details[reason] for reason, _ in reasons})
-        level = HealthLevel.WARN if new_refused or not new else HealthLevel.OK
+        silent = not new and not (counts.received and self._role in TOLD_ON_CHANGE)
+        level = HealthLevel.WARN if new_refused or silent else HealthLevel.OK
         return Report(self._role, level, self._sentence(counts, new), values)
 
     def _sentence(self, counts: RoleStatistics, new: int) -> str:

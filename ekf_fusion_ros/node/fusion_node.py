@@ -14,8 +14,11 @@ import traceback
 from types import FrameType
 from typing import Any
 
+from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseWithCovarianceStamped
 from geometry_msgs.msg import TwistStamped
 from geometry_msgs.msg import TwistWithCovarianceStamped
+from geometry_msgs.msg import Vector3Stamped
 from nav_msgs.msg import Odometry
 import rclpy
 from rclpy.clock import Clock
@@ -30,6 +33,8 @@ from sensor_msgs.msg import FluidPressure
 from sensor_msgs.msg import Imu
 from sensor_msgs.msg import MagneticField
 from sensor_msgs.msg import NavSatFix
+from sensor_msgs.msg import Range
+from std_msgs.msg import Bool
 
 from ekf_fusion_ros.kernels.compile import COMPILED
 from ekf_fusion_ros.node.diagnostics import DiagnosticsPublisher
@@ -50,7 +55,14 @@ TOPICS = {
     'fix_velocity': ('fix_velocity', TwistWithCovarianceStamped),
     'magnetic_field': ('mag', MagneticField),
     'pressure': ('pressure', FluidPressure),
+    'range': ('range', Range),
+    'flow': ('flow', Vector3Stamped),
+    'airspeed': ('airspeed', TwistWithCovarianceStamped),
+    'landed': ('landed', Bool),
+    'gps_heading': ('gps_heading', PoseWithCovarianceStamped),
 }
+# Messages other than the usual ones, by the word in node.<role>_type.
+OTHER_TYPES = {'twist': TwistStamped, 'pose': PoseStamped, 'imu': Imu}
 STALL_S = 0.25
 
 
@@ -98,8 +110,7 @@ class FusionNode(Node):  # type: ignore[misc]
 
     def _subscribe(self, role: str) -> None:
         topic, kind = TOPICS[role]
-        if role == 'fix_velocity' and self._params.node.fix_velocity_type == 'twist':
-            kind = TwistStamped
+        kind = OTHER_TYPES.get(getattr(self._params.node, f'{role}_type', ''), kind)
         subscription = self.create_subscription(
             kind, topic, lambda message: self._queue(role, message), input_qos(role),
             qos_overriding_options=QoSOverridingOptions.with_default_policies())

@@ -34,8 +34,8 @@ Generated from the declarations in `ekf_fusion_ros/params`
 
 The names are the same everywhere: ROS 2 parameters of the node, `--set name=value` and `--params
 FILE` of the replay, and the dataclass tree `ekf_fusion_ros.Params`. Frames and units inside
-`ekf2` are those of PX4: NED earth, FRD body, SI. A PX4 `.params` file is read as it is; the last
-column names what each parameter is called there.
+`ekf2` are those of PX4: NED earth, FRD body, SI. A PX4 `.params` file and a PX4 log (`.ulg`) are
+read as they are; the last column names what each parameter is called there.
 """
 
 
@@ -136,7 +136,7 @@ def _expanded_names() -> Iterator[tuple[str, str]]:
             yield name, f'{foreign} bit {index}'
     for foreign, (name, _) in px4.ENUMERATIONS.items():
         yield name, foreign
-    for table in (px4.SWITCHES, px4.MICROSECONDS, px4.SECONDS):
+    for table in (px4.SWITCHES, px4.MICROSECONDS, px4.SECONDS, px4.MILLISECONDS):
         for foreign, name in table.items():
             yield name, foreign
     for foreign, name in px4.AXES.items():

@@ -289,7 +289,7 @@ class YawEstimatorParams:
     """EKF-GSF bank of yaw hypotheses."""
 
     default_airspeed: float = param(15.0, 'Fixed-wing airspeed where none is measured.',
-                                    unit='m/s', min=0, max=100, px4='EKF2_GSF_TAS_DEFAULT',
+                                    unit='m/s', min=0, max=100, px4='EKF2_GSF_TAS',
                                     ecl='EKFGSF_tas_default')
 
 

@@ -9,9 +9,11 @@ from typing import Any
 
 from ekf_fusion_ros.params.px4 import read_ecl
 from ekf_fusion_ros.params.px4 import read_px4
+from ekf_fusion_ros.params.px4 import shortest
 from ekf_fusion_ros.params.px4 import translate
 from ekf_fusion_ros.params.tree import Params
 from ekf_fusion_ros.params.tree import with_overrides
+from ekf_fusion_ros.params.ulog import read_ulog
 from ekf_fusion_ros.params.yaml_file import read_yaml
 
 
@@ -31,16 +33,18 @@ class LoadedParams:
 
 
 def load_file(path: str | Path, base: Params | None = None) -> LoadedParams:
-    """Read a ROS 2 YAML, PX4 .params or ECL params.txt file on top of `base`.
+    """Read a ROS 2 YAML, PX4 .params, ULog or ECL params.txt file on top of `base`.
 
     Raises ValueError with one sentence that names the file.
     """
     path = Path(path)
     base = Params() if base is None else base
-    readers = {'.yaml': _load_yaml, '.yml': _load_yaml, '.params': _load_px4, '.txt': _load_ecl}
+    readers = {'.yaml': _load_yaml, '.yml': _load_yaml, '.txt': _load_ecl,
+               '.params': _load_px4, '.ulg': _load_ulog}
     reader = readers.get(path.suffix.lower())
     if reader is None:
-        raise ValueError(f'{path}: expected a .yaml (ROS 2), .params (PX4) or .txt (ECL) file')
+        raise ValueError(
+            f'{path}: expected a .yaml (ROS 2), .params or .ulg (PX4) or .txt (ECL) file')
     try:
         return reader(path, base)
     except OSError as error:
@@ -53,9 +57,19 @@ def _load_yaml(path: Path, base: Params) -> LoadedParams:
 
 
 def _load_px4(path: Path, base: Params) -> LoadedParams:
-    foreign, others = read_px4(path)
+    return _from_px4(path, base, *read_px4(path))
+
+
+def _load_ulog(path: Path, base: Params) -> LoadedParams:
+    return _from_px4(path, base, *read_ulog(path))
+
+
+def _from_px4(
+    path: Path, base: Params, numbers: dict[str, float], remarks: list[str],
+) -> LoadedParams:
+    foreign = {name: shortest(value) for name, value in numbers.items()}
     values, unused = _translated(path, foreign, base)
-    return LoadedParams(_applied(path, base, values), unused + others)
+    return LoadedParams(_applied(path, base, values), unused + remarks)
 
 
 def _load_ecl(path: Path, base: Params) -> LoadedParams:

@@ -11,6 +11,10 @@ Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
 
 ODOMETRY_FRAMES = ('auto', 'enu', 'ned', 'frd')
+FLOW_AXES = ('auto', 'frd', 'flu')
+FLOW_CONVENTIONS = ('ecl', 'mavlink')
+AIRSPEED_KINDS = ('equivalent', 'true')
+HEADING_OWNERS = ('vehicle', 'antennas')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,6 +118,82 @@ class PressureMessageParams:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class RangeMessageParams:
+    """Range: mounting and limits of the sensor."""
+
+    mount_xyz: Vector = param(
+        ZERO, 'Position of the range finder in the body frame (FLU, REP-103).', unit='m')
+    min_range: float = param(
+        0.0, 'Smallest distance that the sensor measures; 0 = the one of the message.', unit='m',
+        min=0, max=1000)
+    max_range: float = param(
+        0.0, 'Largest distance that the sensor measures; 0 = the one of the message.', unit='m',
+        min=0, max=10000)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlowMessageParams:
+    """Optical flow as a Vector3Stamped: rates about x and y, quality as z."""
+
+    axes: str = param(
+        'auto', 'Axes of the rates; auto is FRD where the frame name holds the word frd, FLU '
+        'elsewhere.', choices=FLOW_AXES)
+    convention: str = param(
+        'ecl', 'Sign of the rates. ecl: in FRD and without rotation x = +v_right / height, '
+        'y = -v_forward / height. mavlink: the opposite; a right-hand rotation of the sensor '
+        'gives a positive rate (OPTICAL_FLOW_RAD).', choices=FLOW_CONVENTIONS)
+    mount_xyz: Vector = param(
+        ZERO, 'Position of the flow sensor in the body frame (FLU, REP-103).', unit='m')
+    mount_yaw: float = param(
+        0.0, 'Angle about z (FLU) that turns sensor axes into body axes.', unit='rad',
+        min=-6.2832, max=6.2832)
+    max_interval: float = param(
+        0.2, 'Longest interval that one message stands for.', unit='s', min=0.005, max=1)
+    max_rate: float = param(
+        100.0, 'Largest believable rate.', unit='rad/s', min=1, max=1e4)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AirspeedMessageParams:
+    """Airspeed as linear.x of a twist."""
+
+    kind: str = param(
+        'equivalent', 'What linear.x is; equivalent airspeed becomes true airspeed by the '
+        'density of the standard atmosphere at the pressure altitude, without a pressure topic '
+        'at the altitude of the fix.', choices=AIRSPEED_KINDS)
+    temperature_offset: float = param(
+        0.0, 'Temperature of the air above that of the standard atmosphere.', unit='K', min=-60,
+        max=60)
+    max_airspeed: float = param(
+        400.0, 'Largest believable airspeed.', unit='m/s', min=10, max=3000)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LandedMessageParams:
+    """Ground contact as a Bool, and the kind of vehicle that is told with it."""
+
+    fixed_wing: bool = param(False, 'The vehicle flies on wings.')
+    fuse_sideslip: bool = param(False, 'Take the sideslip in flight to be zero on average.')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GpsHeadingMessageParams:
+    """Heading from two antennas."""
+
+    heading_of: str = param(
+        'vehicle', 'Whose heading the message tells: that of the vehicle, or that of the axis '
+        'through the antennas.', choices=HEADING_OWNERS)
+    antenna_yaw: float = param(
+        0.0, 'Angle of the axis through the antennas from body forward, counter-clockwise seen '
+        'from above (FLU).', unit='rad', min=-6.2832, max=6.2832)
+    default_accuracy: float = param(
+        0.05, 'Heading accuracy where the covariance is zero or absent.', unit='rad', min=0.001,
+        max=3.1)
+    min_accuracy: float = param(
+        0.001, 'Smallest heading accuracy that is believed.', unit='rad', min=1e-5, max=3.1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MessageParams:
     """What the messages of each role mean; the groups bear the names of the roles."""
 
@@ -124,3 +204,8 @@ class MessageParams:
     magnetic_field: MagneticFieldMessageParams = field(
         default_factory=MagneticFieldMessageParams)
     pressure: PressureMessageParams = field(default_factory=PressureMessageParams)
+    range: RangeMessageParams = field(default_factory=RangeMessageParams)
+    flow: FlowMessageParams = field(default_factory=FlowMessageParams)
+    airspeed: AirspeedMessageParams = field(default_factory=AirspeedMessageParams)
+    landed: LandedMessageParams = field(default_factory=LandedMessageParams)
+    gps_heading: GpsHeadingMessageParams = field(default_factory=GpsHeadingMessageParams)

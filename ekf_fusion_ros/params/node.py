@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from dataclasses import fields
 
 from ekf_fusion_ros.params.spec import param
 
-FIX_VELOCITY_TYPES = ('twist_with_covariance', 'twist')
+TWIST_TYPES = ('twist_with_covariance', 'twist')
+HEADING_TYPES = ('pose_with_covariance', 'pose', 'imu')
+SWITCH = 'use_'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,9 +23,23 @@ class NodeParams:
         False, 'Subscribe to `fix_velocity` (velocity of the receiver, ENU).')
     fix_velocity_type: str = param(
         'twist_with_covariance', 'Message of `fix_velocity`: TwistWithCovarianceStamped or '
-        'TwistStamped.', choices=FIX_VELOCITY_TYPES)
+        'TwistStamped.', choices=TWIST_TYPES)
     use_magnetic_field: bool = param(False, 'Subscribe to `mag` (sensor_msgs/MagneticField).')
     use_pressure: bool = param(False, 'Subscribe to `pressure` (sensor_msgs/FluidPressure).')
+    use_range: bool = param(False, 'Subscribe to `range` (sensor_msgs/Range, downwards).')
+    use_flow: bool = param(
+        False, 'Subscribe to `flow` (optical flow as geometry_msgs/Vector3Stamped: x, y rates in '
+        'rad/s, z quality 0..1).')
+    use_airspeed: bool = param(False, 'Subscribe to `airspeed` (linear.x of a twist).')
+    airspeed_type: str = param(
+        'twist_with_covariance', 'Message of `airspeed`: TwistWithCovarianceStamped or '
+        'TwistStamped.', choices=TWIST_TYPES)
+    use_landed: bool = param(False, 'Subscribe to `landed` (std_msgs/Bool).')
+    use_gps_heading: bool = param(
+        False, 'Subscribe to `gps_heading` (heading of a receiver with two antennas).')
+    gps_heading_type: str = param(
+        'pose_with_covariance', 'Message of `gps_heading`: PoseWithCovarianceStamped, '
+        'PoseStamped or Imu.', choices=HEADING_TYPES)
     core_rate: float = param(
         100.0, 'Rate of the timer that runs the filter on the queued messages.', unit='Hz',
         min=1, max=1000)
@@ -43,11 +60,8 @@ class NodeParams:
     @property
     def roles(self) -> tuple[str, ...]:
         """Roles of the topics the node listens to."""
-        chosen = (
-            ('odometry', self.use_odometry), ('fix', self.use_fix), ('imu', self.use_imu),
-            ('fix_velocity', self.use_fix_velocity), ('magnetic_field', self.use_magnetic_field),
-            ('pressure', self.use_pressure))
-        return tuple(role for role, used in chosen if used)
+        switches = [field.name for field in fields(self) if field.name.startswith(SWITCH)]
+        return tuple(name.removeprefix(SWITCH) for name in switches if getattr(self, name))
 
     @property
     def output_frame(self) -> str:

@@ -9,9 +9,12 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ekf_fusion_ros.params.ekf2 import HEIGHT_REFERENCES
 from ekf_fusion_ros.params.ekf2 import MAG_TYPES
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
+from ekf_fusion_ros.params.messages import MessageParams
 from ekf_fusion_ros.params.spec import leaves
 
 CHECKS = 'nsats pdop hacc vacc sacc hdrift vdrift hspeed vspeed'.split()
@@ -26,6 +29,10 @@ CHECK_BITS = tuple(f'ekf2.gnss.checks.{check}' for check in CHECKS)
 DECLINATION_BITS = (
     'ekf2.mag.declination_from_table', 'saving the declination', 'ekf2.mag.declination_always',
 )
+GPS_CONTROL_BITS = (
+    'ekf2.gnss.enabled', 'GNSS height beside the height reference',
+    'GNSS velocity, which goes with position here', 'ekf2.gnss.yaw',
+)
 EV_CONTROL_BITS = (
     'ekf2.vision.use_position', 'vision height beside the height reference',
     'ekf2.vision.use_velocity', 'ekf2.vision.use_yaw',
@@ -39,6 +46,7 @@ BIT_MASKS = {
     'mag_declination_source': DECLINATION_BITS,
     'EKF2_DECL_TYPE': DECLINATION_BITS,
     'EKF2_EV_CTRL': EV_CONTROL_BITS,
+    'EKF2_GPS_CTRL': GPS_CONTROL_BITS,
 }
 ENUMERATIONS = {
     'vdist_sensor_type': ('ekf2.height.reference', HEIGHT_REFERENCES),
@@ -58,7 +66,9 @@ MICROSECONDS = {
     'EKF2_NOAID_TOUT': 'ekf2.aiding.valid_timeout',
     'reset_timeout_max': 'ekf2.aiding.reset_timeout',
 }
+# The same number under a name that its parameter does not have for its own.
 SECONDS = {'EKF2_REQ_GPS_H': 'ekf2.gnss.checks.health_time'}
+MILLISECONDS = {'EKF2_MIN_OBS_DT': 'ekf2.timing.sensor_interval_min_ms'}
 AXES = {
     'EKF2_IMU_POS_': 'ekf2.imu.position',
     'EKF2_GPS_POS_': 'ekf2.gnss.position',
@@ -100,10 +110,17 @@ def translate(foreign: Mapping[str, Any], base: Ekf2Params) -> tuple[dict[str, A
 
 
 def _plain_names(base: Ekf2Params) -> dict[str, str]:
-    names = dict(SECONDS)
-    for name, _, spec in leaves(base, 'ekf2.'):
-        names.update({foreign: name for foreign in (spec.px4, spec.ecl) if foreign})
+    names = SECONDS | MILLISECONDS
+    for tree, prefix in ((base, 'ekf2.'), (MessageParams(), 'messages.')):
+        for name, _, spec in leaves(tree, prefix):
+            names.update({foreign: name for foreign in (spec.px4, spec.ecl) if foreign})
     return names
+
+
+def shortest(value: float) -> float:
+    """Return the number that was meant by a single-precision one: 0.1, not 0.100000001."""
+    # A whole number may be an integer parameter, with more digits than single precision holds.
+    return value if value.is_integer() else float(str(np.float32(value)))
 
 
 def _expand_mask(

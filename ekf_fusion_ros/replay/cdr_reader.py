@@ -1,6 +1,6 @@
 """The input messages from CDR bytes, as the flat form that the decoders take.
 
-All of them are a header, perhaps a second string or a few small fields, and doubles: one
+Nearly all are a header, perhaps a second string or a few small fields, and doubles: one
 struct for each length of the strings reads the whole message. Big-endian bytes and other types
 go to the rosbags library.
 """
@@ -76,6 +76,11 @@ def _fix_layout(length: int) -> Callable[..., tuple[Any, ...]]:
     return struct.Struct(f'<iI4x{length}s{rest}').unpack_from
 
 
+@lru_cache(maxsize=64)
+def _range_layout(length: int, floats: int) -> Callable[..., tuple[Any, ...]]:
+    return struct.Struct(f'<iI4x{length}sB{-(length + 1) % 4}x{floats}f').unpack_from
+
+
 def _padding(length: int) -> str:
     """Return the pad bytes before a double, so many bytes after the length of the first string."""
     return f'{-(STRING + length) % 8}x'
@@ -96,6 +101,14 @@ def _nav_sat_fix(data: bytes) -> FlatMessage:
     return FlatMessage(v[0], v[1], _text(v[2]), v[3:])
 
 
+def _range(data: bytes) -> FlatMessage:
+    length = _length(data, ORIGIN + 8)
+    # Recordings of ROS 2 Humble have no variance at the end.
+    end = ORIGIN + STRING + length + 1 + -(length + 1) % 4
+    v = _range_layout(length, 5 if len(data) >= end + 20 else 4)(data, ORIGIN)
+    return FlatMessage(v[0], v[1], _text(v[2]), v[3:])
+
+
 def _odometry(data: bytes) -> FlatMessage:
     length = _length(data, ORIGIN + 8)
     second = _length(data, ORIGIN + STRING + length + -length % 4)
@@ -109,6 +122,10 @@ READERS: dict[str, Callable[[bytes], FlatMessage]] = {
     'sensor_msgs/msg/Imu': partial(_doubles, '37d'),
     'sensor_msgs/msg/MagneticField': partial(_doubles, '12d'),
     'sensor_msgs/msg/FluidPressure': partial(_doubles, '2d'),
+    'sensor_msgs/msg/Range': _range,
+    'geometry_msgs/msg/Vector3Stamped': partial(_doubles, '3d'),
+    'geometry_msgs/msg/PoseStamped': partial(_doubles, '7d'),
+    'geometry_msgs/msg/PoseWithCovarianceStamped': partial(_doubles, '43d'),
     'geometry_msgs/msg/TwistStamped': partial(_doubles, '6d'),
     'geometry_msgs/msg/TwistWithCovarianceStamped': partial(_doubles, '42d'),
 }

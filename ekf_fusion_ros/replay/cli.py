@@ -17,11 +17,9 @@ from ekf_fusion_ros.params import with_overrides
 from ekf_fusion_ros.replay.options import ReplayOptions
 from ekf_fusion_ros.replay.runner import replay
 from ekf_fusion_ros.replay.storage import RecordingError
-from ekf_fusion_ros.roles import LATER
 from ekf_fusion_ros.roles import SUPPORTED
 
 DONE, UNUSABLE, WRONG_ARGUMENTS = 0, 1, 2
-UNUSED_SHOWN = 12
 EXAMPLES = """
 examples:
   replay flight/ --output out
@@ -61,7 +59,7 @@ def _parser() -> argparse.ArgumentParser:
         help='rosbag2 folder, .mcap, .db3 (plain or zstd), or sensor CSV (.csv, .csv.gz)')
     add('--output', type=Path, required=True, metavar='DIR', help='folder for the results')
     add('--params', type=Path, action='append', default=[], metavar='FILE',
-        help='ROS 2 YAML, PX4 .params or ECL params.txt; several in order')
+        help='ROS 2 YAML, PX4 .params or .ulg, or ECL params.txt; several in order')
     add('--set', action='append', default=[], metavar='NAME=VALUE', dest='overrides',
         help='one parameter by its dotted name; after all files')
     add('--topic', action='append', default=[], metavar='ROLE=/NAME', dest='topics',
@@ -71,7 +69,7 @@ def _parser() -> argparse.ArgumentParser:
     add('--end', type=_seconds, metavar='S', help='end S seconds after the start')
     add('--withhold', action='append', default=[], metavar='ROLE=S:E[,S:E...]',
         help='keep messages of a role from the filter in windows of stamps, in seconds after '
-        'the start; fix withholds fix_velocity too')
+        'the start; fix withholds fix_velocity and gps_heading too')
     add('--rate', type=float, metavar='HZ', help='rate of the outputs; 0 = every filter update')
     add('--log-states', action='store_true', help='write estimator.csv, a row a filter update')
     add('--no-bag', action='store_true', help='do not write the fused bag')
@@ -113,9 +111,7 @@ def _params(files: Sequence[Path], overrides: Sequence[str]) -> _Loaded:
         found = load_file(path, loaded.params)
         loaded = replace(loaded, params=found.params, vehicle=loaded.vehicle | found.vehicle)
         if found.unused:
-            shown = ', '.join(found.unused[:UNUSED_SHOWN])
-            more = len(found.unused) - UNUSED_SHOWN
-            print(f'{path}: not used: {shown}' + (f' and {more} more' if more > 0 else ''))
+            print(f'{path}: not used: {", ".join(found.unused)}')
     values = dict(_pair(text, '--set', 'name=value') for text in overrides)
     return replace(loaded, params=with_overrides(loaded.params, values))
 
@@ -131,7 +127,7 @@ def _topics(texts: Sequence[str]) -> dict[str, str]:
     topics: dict[str, str] = {}
     for text in texts:
         role, name = _pair(text, '--topic', 'role=/name, or role= to keep the role out')
-        _check_role(role, '--topic', wanted=bool(name))
+        _check_role(role, '--topic')
         if role in topics:
             raise ValueError(f'--topic {text}: role {role} is given twice')
         topics[role] = name
@@ -142,7 +138,7 @@ def _windows(texts: Sequence[str]) -> dict[str, list[tuple[float, float]]]:
     windows: dict[str, list[tuple[float, float]]] = {}
     for text in texts:
         role, spans = _pair(text, '--withhold', 'role=S:E[,S:E...]')
-        _check_role(role, '--withhold', wanted=True)
+        _check_role(role, '--withhold')
         for span in spans.split(','):
             first, _, end = span.partition(':')
             try:
@@ -155,11 +151,8 @@ def _windows(texts: Sequence[str]) -> dict[str, list[tuple[float, float]]]:
     return windows
 
 
-def _check_role(role: str, option: str, *, wanted: bool) -> None:
-    if role in LATER:
-        if wanted:
-            raise ValueError(f'{option}: role {role} is not supported by this version')
-    elif role not in SUPPORTED:
+def _check_role(role: str, option: str) -> None:
+    if role not in SUPPORTED:
         raise ValueError(f'{option}: unknown role {role!r}; choose of {", ".join(SUPPORTED)}')
 
 

@@ -105,7 +105,8 @@ def make_kernels_ready() -> None:
 
 def _replay_bag(options: ReplayOptions, progress: Progress, say: Say) -> dict[str, Any]:
     with Recording(options.recording, ALL_TYPES) as recording:
-        choice = choose(recording.topics, options.topics, str(options.recording))
+        choice = choose(
+            recording.topics, options.topics, str(options.recording), _switched_on(options.params))
         told = list(recording.notes)
         for line in [*told, *choice.lines()]:
             say(line)
@@ -129,6 +130,12 @@ def _replay_csv(options: ReplayOptions, progress: Progress, say: Say) -> dict[st
     for note in progress.notes:
         say(note)
     return run.finish(Choice(), say)
+
+
+def _switched_on(params: Params) -> list[str]:
+    """Return the roles that parameters add; the node's usual ones say nothing."""
+    usual = Params().node.roles
+    return [role for role in params.node.roles if role not in usual]
 
 
 def _with_roles(params: Params, choice: Choice) -> Params:
@@ -220,7 +227,7 @@ def _bag_steps(
     total = sum(topic.count for topic in choice.topics.values())
     messages = _between(recording, recording.messages(decode), options)
     for batch in _batches(messages, total, options.progress):
-        decoded = [decode[name](data) for _, name, data in batch]
+        decoded = [decode[name](data, time_ns) for time_ns, name, data in batch]
         for role, sample in decoded:
             outputs = session.take(role, sample)
             if outputs:
@@ -242,18 +249,18 @@ def _between(
 
 def _decoder(
     role: str, kind: str, session: FusionSession, withholding: Withholding,
-) -> Callable[[bytes], tuple[str, Any]]:
+) -> Callable[[bytes, int], tuple[str, Any]]:
     """Return what turns the bytes of a topic into its role and a sample or Refused."""
     read, decode = reader_of(kind), session.decode
     withheld = role in withholding.roles
 
-    def decoded(data: bytes) -> tuple[str, Any]:
+    def decoded(data: bytes, log_time_ns: int) -> tuple[str, Any]:
         try:
             message = read(data)
         except Exception as error:
             # Damaged bytes can make the reader raise anything.
             return role, Refused('undecodable', f'{len(data)} bytes are no {kind} ({error})')
-        if withheld and withholding.holds(role, _stamp_us(message)):
+        if withheld and withholding.holds(role, _stamp_us(message, log_time_ns)):
             return role, Refused('withheld', '')
         return role, decode(role, message)
 
@@ -308,6 +315,9 @@ def _batches(items: Iterator[Any], total: int | None, shown: bool) -> Iterator[l
             bar.update(len(batch))
 
 
-def _stamp_us(message: Any) -> int:
+def _stamp_us(message: Any, log_time_ns: int) -> int:
+    """Return the stamp of a message, of one without a header the time it was logged."""
+    if not isinstance(message, FlatMessage) and not hasattr(message, 'header'):
+        return log_time_ns // 1000
     stamp = message if isinstance(message, FlatMessage) else message.header.stamp
     return microseconds(stamp.sec, stamp.nanosec)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from collections.abc import Mapping
 from dataclasses import dataclass
 from dataclasses import field
@@ -18,13 +19,27 @@ TYPES: dict[str, tuple[str, ...]] = {
     roles.IMU: ('sensor_msgs/msg/Imu',),
     roles.MAGNETIC_FIELD: ('sensor_msgs/msg/MagneticField',),
     roles.PRESSURE: ('sensor_msgs/msg/FluidPressure',),
+    roles.RANGE: ('sensor_msgs/msg/Range',),
+    roles.FLOW: ('geometry_msgs/msg/Vector3Stamped',),
+    roles.AIRSPEED: (
+        'geometry_msgs/msg/TwistWithCovarianceStamped', 'geometry_msgs/msg/TwistStamped'),
+    roles.LANDED: ('std_msgs/msg/Bool',),
+    roles.GPS_HEADING: (
+        'geometry_msgs/msg/PoseWithCovarianceStamped', 'geometry_msgs/msg/PoseStamped',
+        'sensor_msgs/msg/Imu'),
 }
 ALL_TYPES = frozenset(kind for kinds in TYPES.values() for kind in kinds)
 WITH_ODOMETRY = (roles.ODOMETRY, roles.FIX)
 WITHOUT_ODOMETRY = (
     roles.IMU, roles.FIX, roles.FIX_VELOCITY, roles.MAGNETIC_FIELD, roles.PRESSURE)
-# A twist may as well be a command or an airspeed.
-VELOCITY_NAMES = ('fix', 'gps', 'gnss', 'navsat')
+# A twist may as well be a command, a truth value may mean anything: the name must tell.
+NAMES = {
+    roles.FIX_VELOCITY: ('fix', 'gps', 'gnss', 'navsat'),
+    roles.FLOW: ('flow',),
+    roles.AIRSPEED: ('airspeed', 'air_speed', 'pitot'),
+    roles.LANDED: ('landed', 'on_ground', 'ground_contact'),
+    roles.GPS_HEADING: ('heading',),
+}
 # Outputs of a fusion, this one's among them, are not its inputs.
 OUTPUT_NAMES = ('odometry/filtered', 'odometry/gps', 'gps/filtered')
 
@@ -43,12 +58,16 @@ class Choice:
         return used + self.remarks
 
 
-def choose(available: Mapping[str, Topic], wanted: Mapping[str, str], recording: str) -> Choice:
+def choose(
+    available: Mapping[str, Topic], wanted: Mapping[str, str], recording: str,
+    switched_on: Collection[str] = (),
+) -> Choice:
     """Return the topics to fuse.
 
     `wanted` maps a role to the topic asked for, '' to keep the role out. Roles not named there
-    are filled by type. Raises RecordingError where a topic is missing or of the wrong type, or
-    nothing could be fused.
+    are filled by type: those that are usual for the recording, and those that parameters have
+    `switched_on`. Raises RecordingError where a topic is missing or of the wrong type, or nothing
+    could be fused.
     """
     choice = Choice()
     for role, name in wanted.items():
@@ -57,11 +76,13 @@ def choose(available: Mapping[str, Topic], wanted: Mapping[str, str], recording:
     candidates = {role: _candidates(available, role) for role in TYPES}
     has_odometry = roles.ODOMETRY in choice.topics or (
         roles.ODOMETRY not in wanted and bool(candidates[roles.ODOMETRY]))
-    for role in WITH_ODOMETRY if has_odometry else WITHOUT_ODOMETRY:
+    usual = WITH_ODOMETRY if has_odometry else WITHOUT_ODOMETRY
+    for role in (*usual, *switched_on):
         if role not in wanted and candidates[role]:
             choice.topics[role] = candidates[role][0]
-    if roles.FIX not in choice.topics and roles.FIX_VELOCITY not in wanted:
-        choice.topics.pop(roles.FIX_VELOCITY, None)
+    for role in roles.PARTS_OF_FIX:
+        if roles.FIX not in choice.topics and role not in wanted:
+            choice.topics.pop(role, None)
     choice.topics = {role: choice.topics[role] for role in TYPES if role in choice.topics}
     _remark(choice, available, wanted)
     try:
@@ -88,20 +109,29 @@ def _asked_for(available: Mapping[str, Topic], role: str, name: str, recording: 
 
 def _candidates(available: Mapping[str, Topic], role: str) -> list[Topic]:
     """Return the topics that could play a role, the likeliest first, the same every time."""
-    found = [topic for topic in available.values()
-             if topic.type in TYPES[role] and topic.count > 0]
-    if role == roles.FIX_VELOCITY:
-        found = [topic for topic in found
-                 if any(word in topic.name.lower() for word in VELOCITY_NAMES)]
+    found = [topic for topic in available.values() if topic.type in TYPES[role]
+             and topic.count > 0 and (role not in NAMES or _is_named_for(topic, role))]
     found.sort(key=lambda topic: (topic.name.endswith(OUTPUT_NAMES), -topic.count, topic.name))
     return found
+
+
+def _is_named_for(topic: Topic, role: str) -> bool:
+    return any(word in topic.name.lower() for word in NAMES.get(role, ()))
+
+
+def _likely_role(topic: Topic) -> str | None:
+    """Return the role that a topic could play: by its name, or by a type that says enough."""
+    able = [role for role, kinds in TYPES.items() if topic.type in kinds]
+    named = [role for role in able if _is_named_for(topic, role)]
+    plain = [role for role in able if role not in NAMES or role == roles.FIX_VELOCITY]
+    return next(iter(named + plain), None)
 
 
 def _remark(choice: Choice, available: Mapping[str, Topic], wanted: Mapping[str, str]) -> None:
     """Say which topics were left out and how each could be added."""
     used = {topic.name for topic in choice.topics.values()}
     for topic in available.values():
-        role = next((role for role, kinds in TYPES.items() if topic.type in kinds), None)
+        role = _likely_role(topic)
         if role is None or topic.name in used:
             continue
         taken = choice.topics.get(role)

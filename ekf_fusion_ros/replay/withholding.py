@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from collections.abc import Sequence
 
 from ekf_fusion_ros.roles import FIX
-from ekf_fusion_ros.roles import FIX_VELOCITY
+from ekf_fusion_ros.roles import PARTS_OF_FIX
 
 Window = tuple[float, float]
 
@@ -20,8 +20,8 @@ class Withholding:
                    for first, end in pairs]
             for role, pairs in windows.items()}
         if FIX in self._windows:
-            pairs = self._windows.get(FIX_VELOCITY, [])
-            self._windows[FIX_VELOCITY] = pairs + self._windows[FIX]
+            for role in PARTS_OF_FIX:
+                self._windows[role] = self._windows.get(role, []) + self._windows[FIX]
         self.roles = frozenset(self._windows)
 
     def holds(self, role: str, time_us: int) -> bool:

@@ -10,15 +10,19 @@ from dataclasses import replace
 from pathlib import Path
 import sys
 
+from ekf_fusion_ros.simulation.scenario import FURTHER_ROLES
+from ekf_fusion_ros.simulation.scenario import GPS_HEADING
 from ekf_fusion_ros.simulation.scenario import ROLES
 from ekf_fusion_ros.simulation.scenario import Scenario
 from ekf_fusion_ros.simulation.scenario import default_sensors
 from ekf_fusion_ros.simulation.sensor import Window
+from ekf_fusion_ros.simulation.surroundings import Wind
 from ekf_fusion_ros.simulation.trajectory import Circle
 from ekf_fusion_ros.simulation.trajectory import Drive
 from ekf_fusion_ros.simulation.trajectory import FigureOfEight
 from ekf_fusion_ros.simulation.trajectory import Flight
 from ekf_fusion_ros.simulation.trajectory import Hover
+from ekf_fusion_ros.simulation.trajectory import Loiter
 from ekf_fusion_ros.simulation.trajectory import Trajectory
 from ekf_fusion_ros.simulation.truth_file import write_truth
 
@@ -28,7 +32,9 @@ TRAJECTORIES: Mapping[str, Callable[[float], Trajectory]] = {
     'eight': lambda duration: FigureOfEight(duration=duration),
     'drive': lambda duration: Drive(duration=duration, stops=((40.0, 55.0),)),
     'flight': lambda duration: Flight(duration=duration),
+    'loiter': lambda duration: Loiter(duration=duration),
 }
+KNOWN_ROLES = (*ROLES, *FURTHER_ROLES, GPS_HEADING)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -68,7 +74,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--duration', type=float, default=180.0, metavar='S')
     parser.add_argument('--seed', type=int, default=0, help='of all random errors')
     parser.add_argument('--roles', default=','.join(ROLES), metavar='ROLE,...',
-                        help='sensors on board (default: %(default)s)')
+                        help='sensors on board (default: %(default)s; further ones: '
+                        f'{", ".join(KNOWN_ROLES[len(ROLES):])})')
+    parser.add_argument('--wind', default='0,0', metavar='N,E',
+                        help='where the air goes, north and east in m/s')
     parser.add_argument('--outage', action='append', default=[], metavar='ROLE=S:E[,S:E...]',
                         help='windows without messages of a role, s from the start')
     return parser
@@ -81,17 +90,25 @@ def _scenario(options: argparse.Namespace) -> Scenario:
         raise ValueError(f'--seed {options.seed}: must not be negative')
     roles = [role for role in options.roles.split(',') if role]
     for role in roles:
-        if role not in ROLES:
-            raise ValueError(f'--roles {role}: choose from {", ".join(ROLES)}')
+        if role not in KNOWN_ROLES:
+            raise ValueError(f'--roles {role}: choose from {", ".join(KNOWN_ROLES)}')
     sensors = default_sensors(roles)
     for text in options.outage:
         role, windows = _outage(text)
         if role not in sensors:
             raise ValueError(f'--outage {text}: {role!r} is not one of the roles on board')
         sensors[role] = replace(sensors[role], outages=windows)
-    return Scenario(
-        trajectory=TRAJECTORIES[options.trajectory](options.duration), sensors=sensors,
-        seed=options.seed)
+    trajectory = replace(
+        TRAJECTORIES[options.trajectory](options.duration), wind=_wind(options.wind))
+    return Scenario(trajectory=trajectory, sensors=sensors, seed=options.seed)
+
+
+def _wind(text: str) -> Wind:
+    try:
+        north, east = (float(word) for word in text.split(','))
+    except ValueError:
+        raise ValueError(f'--wind {text}: write NORTH,EAST in m/s, for example 3,-2') from None
+    return Wind(mean=(north, east, 0.0))
 
 
 def _outage(text: str) -> tuple[str, tuple[Window, ...]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection
 from collections.abc import Iterator
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,11 +14,16 @@ from ekf_fusion_ros.estimator import GeoPoint
 from ekf_fusion_ros.geo.magnetic_field import EclFieldTable
 from ekf_fusion_ros.samples import ImuSample
 from ekf_fusion_ros.samples import Sample
+from ekf_fusion_ros.simulation.airspeed import Airspeed
 from ekf_fusion_ros.simulation.barometer import Barometer
+from ekf_fusion_ros.simulation.dual_antenna import DualAntennaGnss
 from ekf_fusion_ros.simulation.gnss import Gnss
+from ekf_fusion_ros.simulation.ground_contact import GroundContact
 from ekf_fusion_ros.simulation.imu import Imu
 from ekf_fusion_ros.simulation.magnetometer import Magnetometer
 from ekf_fusion_ros.simulation.magnetometer import earth_field
+from ekf_fusion_ros.simulation.optical_flow import OpticalFlow
+from ekf_fusion_ros.simulation.range_finder import RangeFinder
 from ekf_fusion_ros.simulation.sensor import Sensor
 from ekf_fusion_ros.simulation.sensor import Vector
 from ekf_fusion_ros.simulation.trajectory import Trajectory
@@ -27,6 +32,13 @@ from ekf_fusion_ros.simulation.vision import Vision
 ORIGIN = GeoPoint(47.397742, 8.545594, 488.0)
 START_US = 1_700_000_000_000_000
 ROLES = ('odometry', 'fix', 'imu', 'magnetic_field', 'pressure')
+FURTHER_ROLES = ('range', 'flow', 'airspeed', 'landed')
+GPS_HEADING = 'gps_heading'
+"""No sensor of its own: a receiver with two antennas tells it with the fix."""
+
+# Each role keeps its random numbers whatever roles are added to the lists.
+STREAMS = {role: number for first, roles in ((0, ROLES), (100, FURTHER_ROLES))
+           for number, role in enumerate(roles, first)}
 
 
 class Arrival(NamedTuple):
@@ -52,14 +64,14 @@ class Scenario:
 
     def __post_init__(self) -> None:
         for role in self.sensors:
-            if role not in ROLES:
-                raise ValueError(f'sensor role {role!r}: choose one of {", ".join(ROLES)}')
+            if role not in STREAMS:
+                raise ValueError(f'sensor role {role!r}: choose one of {", ".join(STREAMS)}')
 
     def arrivals(self) -> Iterator[Arrival]:
         """Yield all samples in the order of arrival; at equal times IMU samples come last."""
         everything: list[Arrival] = []
         for role, sensor in self.sensors.items():
-            rng = np.random.default_rng([self.seed, ROLES.index(role)])
+            rng = np.random.default_rng([self.seed, STREAMS[role]])
             latency = round(sensor.latency * 1e6)
             everything += [
                 Arrival(sample.time_us + latency, role, sample)
@@ -69,16 +81,26 @@ class Scenario:
         yield from everything
 
 
-def default_sensors(roles: Iterable[str] = ROLES, origin: GeoPoint = ORIGIN) -> dict[str, Sensor]:
-    """Return one sensor of usual quality for each of the roles; replace entries as needed."""
+def default_sensors(
+    roles: Collection[str] = ROLES, origin: GeoPoint = ORIGIN,
+) -> dict[str, Sensor]:
+    """Return one sensor of usual quality for each of the roles; replace entries as needed.
+
+    `gps_heading` among the roles gives the receiver of `fix` a second antenna.
+    """
+    receiver = DualAntennaGnss if GPS_HEADING in roles else Gnss
     everything: dict[str, Sensor] = {
         'odometry': Vision(),
-        'fix': Gnss(origin=origin),
+        'fix': receiver(origin=origin),
         'imu': Imu(),
         'magnetic_field': Magnetometer(earth_field=field_at(origin)),
         'pressure': Barometer(reference=origin.alt),
+        'range': RangeFinder(),
+        'flow': OpticalFlow(),
+        'airspeed': Airspeed(reference=origin.alt),
+        'landed': GroundContact(),
     }
-    return {role: everything[role] for role in roles}
+    return {role: everything[role] for role in roles if role != GPS_HEADING}
 
 
 def field_at(origin: GeoPoint) -> Vector:

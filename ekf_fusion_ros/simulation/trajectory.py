@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from ekf_fusion_ros.simulation import series
 from ekf_fusion_ros.simulation.series import Series
+from ekf_fusion_ros.simulation.surroundings import Terrain
+from ekf_fusion_ros.simulation.surroundings import Wind
 
 Array = NDArray[np.float64]
 GRAVITY = 9.80665
@@ -72,9 +74,14 @@ class Motion:
 
 @dataclass(frozen=True, kw_only=True)
 class Trajectory(ABC):
-    """A motion given by position and forward direction as analytic functions of time."""
+    """A motion given by position and forward direction as analytic functions of time.
+
+    The wind and the ground are what sensors of air and distance meet on the way.
+    """
 
     duration: float
+    wind: Wind = Wind()
+    terrain: Terrain = Terrain()
 
     @abstractmethod
     def position(self, t: Series) -> list[Series]:
@@ -141,6 +148,27 @@ class Circle(Trajectory):
 
     def _angle(self, t: Series) -> Series:
         return _travel(t, ((self.start, self.speed / self.radius),), self.blend)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loiter(Circle):
+    """An aeroplane that circles in air which carries it along: it never flies sideways.
+
+    `speed` is true airspeed. It starts at rest on the ground; from `start` + `blend` on the nose
+    points where the air comes from, as long as the wind has no gusts.
+    """
+
+    radius: float = 120.0
+    speed: float = 18.0
+    height: float = 60.0
+    climb_time: float = 30.0
+
+    def position(self, t: Series) -> list[Series]:
+        north, east, _ = super().position(t)
+        down = -self.height * series.step((t - self.start) / self.climb_time)
+        carried = _travel(t, ((self.start, 1.0),), self.blend)
+        wind = self.wind.mean
+        return [north + wind[0] * carried, east + wind[1] * carried, down]
 
 
 @dataclass(frozen=True, kw_only=True)

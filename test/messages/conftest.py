@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -72,6 +73,28 @@ class Build:
         return SimpleNamespace(
             header=self.header('base_link'), fluid_pressure=101325.0, variance=0.0)
 
+    def range(self, distance=4.0):
+        return SimpleNamespace(
+            header=self.header('range_link'), radiation_type=1, field_of_view=0.05,
+            min_range=0.2, max_range=20.0, range=distance, variance=0.0)
+
+    def flow(self, x=0.5, y=-0.25, quality=0.8, frame_id='flow_frd', **stamp):
+        return SimpleNamespace(
+            header=self.header(frame_id, **stamp), vector=self.vector(x, y, quality))
+
+    def airspeed(self, speed=20.0):
+        message = self.fix_velocity(frame_id='base_link')
+        message.twist.twist.linear = self.vector(speed)
+        return message
+
+    def gps_heading(self, yaw=0.25, variance=1e-4):
+        pose = SimpleNamespace(
+            position=self.vector(),
+            orientation=self.quaternion(w=math.cos(0.5 * yaw), z=math.sin(0.5 * yaw)))
+        return SimpleNamespace(
+            header=self.header('gps'), pose=SimpleNamespace(
+                pose=pose, covariance=diagonal((0.0, 0.0, 0.0, 1e6, 1e6, variance))))
+
 
 @pytest.fixture(scope='session')
 def build():
@@ -94,4 +117,5 @@ def recorded():
             return [reader.deserialize(raw, connection.msgtype)
                     for connection, _, raw in reader.messages(connections)]
 
+    read.folder = SHARED_DATA
     return read

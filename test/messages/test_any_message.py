@@ -10,12 +10,16 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
+from ekf_fusion_ros.messages.decode_airspeed import decode_airspeed
 from ekf_fusion_ros.messages.decode_fix import decode_fix
 from ekf_fusion_ros.messages.decode_fix import decode_fix_velocity
+from ekf_fusion_ros.messages.decode_flow import decode_flow
+from ekf_fusion_ros.messages.decode_gps_heading import decode_gps_heading
 from ekf_fusion_ros.messages.decode_imu import decode_imu
 from ekf_fusion_ros.messages.decode_magnetic_field import decode_magnetic_field
 from ekf_fusion_ros.messages.decode_odometry import decode_odometry
 from ekf_fusion_ros.messages.decode_pressure import decode_pressure
+from ekf_fusion_ros.messages.decode_range import decode_range
 from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.params.messages import MessageParams
 
@@ -23,6 +27,8 @@ PARAMS = MessageParams()
 DECODERS = {
     'odometry': decode_odometry, 'fix': decode_fix, 'fix_velocity': decode_fix_velocity,
     'imu': decode_imu, 'magnetic_field': decode_magnetic_field, 'pressure': decode_pressure,
+    'range': decode_range, 'flow': decode_flow, 'airspeed': decode_airspeed,
+    'gps_heading': decode_gps_heading,
 }
 
 nasty = st.one_of(
@@ -77,6 +83,13 @@ def test_spoiled_messages_are_refused_or_sane(build, role, data):
     ('sensor_msgs.msg', 'Imu', 'imu'),
     ('sensor_msgs.msg', 'FluidPressure', 'pressure'),
     ('sensor_msgs.msg', 'MagneticField', 'magnetic_field'),
+    ('sensor_msgs.msg', 'Range', 'range'),
+    ('geometry_msgs.msg', 'Vector3Stamped', 'flow'),
+    ('geometry_msgs.msg', 'TwistStamped', 'airspeed'),
+    ('geometry_msgs.msg', 'TwistWithCovarianceStamped', 'airspeed'),
+    ('geometry_msgs.msg', 'PoseStamped', 'gps_heading'),
+    ('geometry_msgs.msg', 'PoseWithCovarianceStamped', 'gps_heading'),
+    ('sensor_msgs.msg', 'Imu', 'gps_heading'),
 ])
 def test_ros_classes_decode(package, kind, role):
     message = getattr(pytest.importorskip(package), kind)()
@@ -92,6 +105,8 @@ def test_ros_classes_decode(package, kind, role):
         message.magnetic_field.x = 2e-5
     elif role == 'fix':
         message.status.status = 0
+    elif role == 'range':
+        message.max_range = 9.0
     elif role == 'odometry':
         message.pose.pose.position.x = 4.0
     assert DECODERS[role](message, PARAMS).time_us == 7_000_000

@@ -18,7 +18,9 @@ pytest.importorskip('rclpy')
 pytest.importorskip('rosbags')
 pytest.importorskip('tqdm')
 
+from geometry_msgs.msg import PoseWithCovarianceStamped
 from geometry_msgs.msg import TwistWithCovarianceStamped
+from geometry_msgs.msg import Vector3Stamped
 from nav_msgs.msg import Odometry
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin
@@ -29,10 +31,11 @@ from sensor_msgs.msg import FluidPressure
 from sensor_msgs.msg import Imu
 from sensor_msgs.msg import MagneticField
 from sensor_msgs.msg import NavSatFix
+from sensor_msgs.msg import Range
+from std_msgs.msg import Bool
 
 from ekf_fusion_ros.replay import cli as replay
 from ekf_fusion_ros.replay.recording import write_recording
-from ekf_fusion_ros.simulation.scenario import ROLES
 from ekf_fusion_ros.simulation.scenario import Scenario
 from ekf_fusion_ros.simulation.scenario import default_sensors
 from ekf_fusion_ros.simulation.trajectory import FigureOfEight
@@ -52,6 +55,11 @@ INPUTS = {
     'fix_velocity': ('fix_velocity', TwistWithCovarianceStamped),
     'magnetic_field': ('mag', MagneticField),
     'pressure': ('pressure', FluidPressure),
+    'range': ('range', Range),
+    'flow': ('flow', Vector3Stamped),
+    'airspeed': ('airspeed', TwistWithCovarianceStamped),
+    'landed': ('landed', Bool),
+    'gps_heading': ('gps_heading', PoseWithCovarianceStamped),
 }
 IN_FLIGHT = 300
 DEPTH = 10000
@@ -178,12 +186,18 @@ INERTIAL = {
     'magnetic_field': '/mag', 'pressure': '/pressure'}
 
 
-@pytest.mark.parametrize('topics', [INERTIAL, {**INERTIAL, 'odometry': '/odom'}],
-                         ids=['inertial', 'every sensor'])
+FURTHER = {
+    'range': '/range', 'flow': '/flow', 'airspeed': '/airspeed', 'landed': '/landed',
+    'gps_heading': '/gps_heading'}
+
+
+@pytest.mark.parametrize(
+    'topics', [INERTIAL, {**INERTIAL, 'odometry': '/odom'}, {**INERTIAL, **FURTHER}],
+    ids=['inertial', 'with odometry', 'further roles'])
 def test_simulated_flight(
     tmp_path: Path, start_fuser: StartFuser, peer: Peer, topics: dict[str, str],
 ) -> None:
-    roles = tuple(role for role in ROLES if role in topics)
+    roles = tuple(role for role in topics if role != 'fix_velocity')
     play = Play(simulated(tmp_path, roles, 25.0), topics)
     rows = rows_of_replay(play, tmp_path / 'out')
     assert len(rows) > 500

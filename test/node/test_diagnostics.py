@@ -46,6 +46,13 @@ def test_level_follows_what_is_new() -> None:
     assert 'none since the last report' in silent.text
 
 
+def test_landed_may_be_silent_once_it_has_spoken() -> None:
+    watch = TopicWatch('landed', '/landed')
+    assert watch.report(RoleStatistics()).level == HealthLevel.WARN
+    counts = RoleStatistics(received=1, accepted=1)
+    assert [watch.report(counts).level for _ in range(3)] == 3 * [HealthLevel.OK]
+
+
 def test_trouble_of_the_node_raises_the_level_once() -> None:
     watch = EstimatorWatch()
     health = Health(HealthLevel.OK, 'ok: gnss position', {'horizon': '0.2'})

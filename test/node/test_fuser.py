@@ -100,6 +100,21 @@ def test_topics_have_their_quality_of_service(start_fuser: StartFuser, peer: Pee
         assert [profile.reliability for profile in profiles] == [ReliabilityPolicy.BEST_EFFORT]
 
 
+def test_further_roles_listen_to_the_message_that_is_chosen(start_fuser: StartFuser) -> None:
+    fuser = start_fuser({
+        'node.use_range': True, 'node.use_flow': True, 'node.use_landed': True,
+        'node.use_airspeed': True, 'node.airspeed_type': 'twist',
+        'node.use_gps_heading': True, 'node.gps_heading_type': 'pose'})
+    deadline = time.monotonic() + 120.0
+    while 'not listening to' not in fuser.output and time.monotonic() < deadline:
+        time.sleep(0.1)
+    for line in ('range: Range on /range', 'flow: Vector3Stamped on /flow',
+                 'airspeed: TwistStamped on /airspeed', 'landed: Bool on /landed',
+                 'gps_heading: PoseStamped on /gps_heading'):
+        assert line in fuser.output
+    assert 'not listening to imu, fix_velocity, magnetic_field, pressure:' in fuser.output
+
+
 def test_parameters_are_described_to_other_nodes(start_fuser: StartFuser, peer: Peer) -> None:
     fuser = start_fuser()
     client = peer.node.create_client(DescribeParameters, '/fuser/describe_parameters')

@@ -9,6 +9,7 @@ import pytest
 from ekf_fusion_ros.params import Params
 from ekf_fusion_ros.params import load_file
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
+from ekf_fusion_ros.params.px4 import shortest
 from ekf_fusion_ros.params.px4 import translate
 from ekf_fusion_ros.params.spec import leaves
 
@@ -86,6 +87,29 @@ def test_modern_vision_control_bits() -> None:
         'ekf2.height.reference': 'gnss',
     }
     assert unused == ['EKF2_EV_CTRL bit 1 (vision height beside the height reference)']
+
+
+def test_modern_gnss_control_bits() -> None:
+    values, unused = translate({'EKF2_GPS_CTRL': 15}, Ekf2Params())
+
+    assert values == {'ekf2.gnss.enabled': True, 'ekf2.gnss.yaw': True}
+    assert unused == ['EKF2_GPS_CTRL bit 1 (GNSS height beside the height reference)',
+                      'EKF2_GPS_CTRL bit 2 (GNSS velocity, which goes with position here)']
+
+
+def test_names_outside_of_the_estimator() -> None:
+    values, unused = translate({'EKF2_EVP_NOISE': 0.2, 'EKF2_MIN_OBS_DT': 30.0}, Ekf2Params())
+
+    assert values == {'messages.odometry.position_noise': 0.2,
+                      'ekf2.timing.sensor_interval_min_ms': 30.0}
+    assert unused == []
+
+
+@pytest.mark.parametrize(('stored', 'meant'), [
+    (0.100000001490116120, 0.1), (0.300000011920928955, 0.3), (9.999999747378752e-05, 1e-4),
+    (3.0, 3.0), (16777217.0, 16777217.0), (float('inf'), float('inf'))])
+def test_single_precision_is_read_as_it_was_meant(stored: float, meant: float) -> None:
+    assert shortest(stored) == meant
 
 
 def test_bits_nobody_knows_are_listed() -> None:

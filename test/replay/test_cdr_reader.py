@@ -39,6 +39,8 @@ def random_value(base, text):
         return text
     if base == 'float64':
         return float(RNG.normal())
+    if base == 'float32':
+        return float(np.float32(RNG.normal()))
     return int(RNG.integers(0, 100))
 
 
@@ -104,6 +106,19 @@ def test_bytes_cut_short_raise(kind):
     for length in (0, 3, 4, 10, 20, len(data) // 2, len(data) - 9):
         with pytest.raises((ValueError, struct.error, IndexError, SerdeError)):
             read(data[:length])
+
+
+def test_range_of_humble_has_no_variance():
+    kind = 'sensor_msgs/msg/Range'
+    message = random_message(kind, 'lidar')
+    read = cdr_reader.reader_of(kind)(bytes(STORE.serialize_cdr(message, kind))[:-4])
+    assert list(read.numbers) == list(numbers_of(message))[:-1]
+
+
+def test_a_message_without_header():
+    kind = 'std_msgs/msg/Bool'
+    data = bytes(STORE.serialize_cdr(STORE.types[kind](data=True), kind))
+    assert cdr_reader.reader_of(kind)(data).data is True
 
 
 def test_a_huge_string_length_is_no_message():

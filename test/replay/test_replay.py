@@ -207,7 +207,6 @@ def test_parameters_in_order_of_files_then_set(flight, tmp_path):
     (['--set', 'nonsense'], 'name=value'),
     (['--params', 'none.yaml'], 'none.yaml'),
     (['--topic', 'odometer=/odom'], 'unknown role'),
-    (['--topic', 'flow=/flow'], 'not supported'),
     (['--topic', 'fix'], 'role=/name'),
     (['--withhold', 'fix=20'], 'window'),
     (['--withhold', 'fix=20:10'], 'ends before'),

@@ -10,6 +10,8 @@ topics = pytest.importorskip('ekf_fusion_ros.replay.topics')
 ODOM, FIX, IMU = 'nav_msgs/msg/Odometry', 'sensor_msgs/msg/NavSatFix', 'sensor_msgs/msg/Imu'
 TWIST = 'geometry_msgs/msg/TwistWithCovarianceStamped'
 MAG = 'sensor_msgs/msg/MagneticField'
+RANGE, BOOL = 'sensor_msgs/msg/Range', 'std_msgs/msg/Bool'
+VECTOR, POSE = 'geometry_msgs/msg/Vector3Stamped', 'geometry_msgs/msg/PoseStamped'
 
 
 def recording(*rows):
@@ -46,6 +48,36 @@ def test_asked_for_and_kept_out():
         'odometry': '/odom', 'fix': '/fix', 'imu': '/imu'}
     assert names(choose(available, fix='')) == {'odometry': '/odom'}
     assert names(choose(available, odometry='')) == {'fix': '/fix', 'imu': '/imu'}
+
+
+FURTHER = recording(
+    ('/imu', IMU, 900), ('/fix', FIX, 9), ('/lidar', RANGE, 90), ('/px4flow', VECTOR, 90),
+    ('/wind', VECTOR, 900), ('/airspeed', TWIST, 90), ('/armed', BOOL, 9), ('/landed', BOOL, 9),
+    ('/gps/heading', POSE, 9), ('/goal_pose', POSE, 1))
+
+
+def test_further_roles_stay_out_until_asked_for_and_it_is_said_how():
+    choice = choose(FURTHER)
+    assert names(choice) == {'imu': '/imu', 'fix': '/fix'}
+    hints = [line.rsplit(' ', 1)[-1] for line in choice.remarks]
+    assert hints == ['range=/lidar', 'flow=/px4flow', 'airspeed=/airspeed', 'landed=/landed',
+                     'gps_heading=/gps/heading']
+
+
+def test_further_roles_by_name():
+    assert names(choose(FURTHER, range='/lidar', flow='/wind', landed='/armed')) == {
+        'imu': '/imu', 'fix': '/fix', 'range': '/lidar', 'flow': '/wind', 'landed': '/armed'}
+
+
+def test_further_roles_switched_on_by_parameters():
+    every = ('range', 'flow', 'airspeed', 'landed', 'gps_heading')
+    choice = topics.choose(FURTHER, {'landed': ''}, 'flight', every)
+    assert names(choice) == {
+        'imu': '/imu', 'fix': '/fix', 'range': '/lidar', 'flow': '/px4flow',
+        'airspeed': '/airspeed', 'gps_heading': '/gps/heading'}
+    assert 'left out as asked: /landed (std_msgs/msg/Bool)' in choice.remarks
+    # The heading goes with the fix.
+    assert 'gps_heading' not in names(topics.choose(FURTHER, {'fix': ''}, 'flight', every))
 
 
 def test_of_several_the_choice_is_stable_and_said():

@@ -19,5 +19,6 @@ def test_windows_are_half_open_and_count_from_the_start():
 def test_fix_takes_its_velocity_along_and_not_the_other_way():
     windows = Withholding({'fix': [(1.0, 2.0)], 'fix_velocity': [(8.0, 9.0)]}, START)
     assert windows.holds('fix_velocity', START + 1_500_000)
+    assert windows.holds('gps_heading', START + 1_500_000)
     assert windows.holds('fix_velocity', START + 8_500_000)
     assert not windows.holds('fix', START + 8_500_000)

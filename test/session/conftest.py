@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -110,6 +111,31 @@ class Build:
 
     def pressure(self, t):
         return SimpleNamespace(header=self.header(t), fluid_pressure=95000.0, variance=0.0)
+
+    def range(self, t, distance=4.0):
+        return SimpleNamespace(
+            header=self.header(t), radiation_type=1, field_of_view=0.05, min_range=0.2,
+            max_range=20.0, range=distance, variance=0.0)
+
+    def flow(self, t, x=0.5):
+        return SimpleNamespace(header=self.header(t, 'flow_frd'), vector=self.vector(x, 0.0, 1.0))
+
+    def airspeed(self, t, speed=20.0):
+        message = self.fix_velocity(t)
+        message.twist.twist.linear = self.vector(speed)
+        return message
+
+    @staticmethod
+    def landed(landed=True):
+        return SimpleNamespace(data=landed)
+
+    def gps_heading(self, t, yaw=0.25):
+        orientation = SimpleNamespace(
+            w=math.cos(0.5 * yaw), x=0.0, y=0.0, z=math.sin(0.5 * yaw))
+        return SimpleNamespace(
+            header=self.header(t), pose=SimpleNamespace(
+                pose=SimpleNamespace(position=self.vector(), orientation=orientation),
+                covariance=1e-4 * np.eye(6).ravel()))
 
     def odometry(self, t, x=0.0):
         return SimpleNamespace(

@@ -68,12 +68,40 @@ def test_mounting_of_the_messages_becomes_the_lever_arm():
 @pytest.mark.parametrize(('roles', 'word'), [
     (('fix',), 'no inertial input'),
     (('imu', 'fix_velocity'), 'needs a fix'),
-    (('imu', 'flow'), 'not supported'),
+    (('imu', 'gps_heading'), 'needs a fix'),
     (('imu', 'gyroscope'), 'unknown role'),
 ])
 def test_roles_that_cannot_be_fused(roles, word):
     with pytest.raises(ValueError, match=word):
         configure(Params(), roles)
+
+
+def test_dual_antenna_heading_is_used_where_it_comes():
+    assert configure(Params(), ('imu', 'fix', 'gps_heading')).ekf2.gnss.yaw
+    assert not configure(Params(), ('imu', 'fix')).ekf2.gnss.yaw
+
+
+@pytest.mark.parametrize(('roles', 'reference'), [
+    (('imu', 'range', 'flow'), 'range'), (('imu', 'flow'), 'vision'),
+    (('imu', 'range', 'fix'), 'gnss'), (('imu', 'range', 'odometry'), 'vision'),
+    (('imu', 'range', 'pressure'), 'baro')])
+def test_height_without_pressure(roles, reference):
+    assert configure(Params(), roles).ekf2.height.reference == reference
+
+
+@pytest.mark.parametrize('role', ['range', 'flow', 'airspeed', 'landed'])
+def test_each_further_role_joins_and_changes_nothing_of_the_others(role):
+    plain = configure(Params(), ('imu', 'fix', 'pressure')).ekf2
+    joined = configure(Params(), ('imu', 'fix', 'pressure', role)).ekf2
+    for group in ('gnss', 'vision', 'mag', 'baro', 'height', 'imu', 'timing'):
+        assert getattr(joined, group) == getattr(plain, group)
+
+
+def test_parts_of_a_fix_may_be_as_late_as_pairing_allows():
+    params = configure(Params(), {'imu', 'fix', 'fix_velocity', 'gps_heading'})
+    assert age_limit_us(params, 'gps_heading') == age_limit_us(params, 'fix_velocity') == 500_000
+    # 200 ms of horizon and 100 ms beyond it, less 100 ms of delay and 20 ms of holding
+    assert age_limit_us(params, 'airspeed') == 180_000
 
 
 def test_fix_older_than_the_horizon_can_take_is_refused():

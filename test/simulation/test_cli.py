@@ -24,6 +24,19 @@ def test_recording_and_truth_are_written(tmp_path, capsys):
     assert '41 messages' in said
 
 
+def test_further_sensors_and_wind(tmp_path, capsys):
+    pytest.importorskip('rosbags')
+    status = main([str(tmp_path / 'out'), '--trajectory', 'loiter', '--duration', '10', '--roles',
+                   'imu,fix,range,flow,airspeed,landed,gps_heading', '--wind', '3,-2'])
+    assert status == 0
+    said = capsys.readouterr().out
+    for topic in ('/range', '/flow', '/airspeed', '/landed', '/gps_heading'):
+        assert topic in said
+    with (tmp_path / 'out' / 'truth.csv').open() as stream:
+        row = list(csv.DictReader(stream))[-1]
+    assert (float(row['wind_x']), float(row['wind_y']), float(row['ground'])) == (-2.0, 3.0, 0.0)
+
+
 def test_existing_recording_is_not_touched(tmp_path, capsys):
     (tmp_path / 'recording').mkdir()
     assert main([str(tmp_path), '--duration', '1']) == 1
@@ -34,6 +47,7 @@ def test_existing_recording_is_not_touched(tmp_path, capsys):
     (['--duration', '-3'], '--duration'),
     (['--seed', '-3'], '--seed'),
     (['--roles', 'odometry,sonar'], 'sonar'),
+    (['--wind', '3'], '--wind'),
     (['--outage', 'fix=10'], '--outage'),
     (['--roles', 'imu', '--outage', 'fix=10:20'], 'fix'),
     (['--trajectory', 'loop'], 'loop'),

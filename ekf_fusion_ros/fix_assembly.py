@@ -1,0 +1,73 @@
+"""Puts a fix together from its topics: position, velocity, heading."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Collection
+from collections.abc import Mapping
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from ekf_fusion_ros.pairing import FixPairing
+from ekf_fusion_ros.pairing import Part
+from ekf_fusion_ros.pairing import with_heading
+from ekf_fusion_ros.pairing import with_velocity
+from ekf_fusion_ros.roles import FIX_VELOCITY
+from ekf_fusion_ros.roles import GPS_HEADING
+from ekf_fusion_ros.samples import GnssSample
+from ekf_fusion_ros.statistics import RoleStatistics
+
+if TYPE_CHECKING:
+    from ekf_fusion_ros.params.session import SessionParams
+
+JOINS: dict[str, Callable[..., GnssSample]] = {
+    FIX_VELOCITY: with_velocity, GPS_HEADING: with_heading}
+
+
+class FixAssembly:
+    """A chain of pairings: what leaves one goes into the next, fixes stay in order.
+
+    With no such topic in use a fix passes at once.
+    """
+
+    def __init__(
+        self, statistics: Mapping[str, RoleStatistics], roles: Collection[str],
+        params: SessionParams,
+    ) -> None:
+        """Pair with the topics in `roles`; `statistics` counts what stays alone."""
+        tolerance_us = round(1e6 * params.pairing_tolerance)
+        wait_us = round(1e6 * params.pairing_wait)
+        self._stages = [role for role in JOINS if role in roles]
+        self._pairings = [FixPairing(statistics[role], tolerance_us, wait_us, JOINS[role])
+                          for role in self._stages]
+
+    def push_fix(self, fix: GnssSample) -> Sequence[GnssSample]:
+        """Return the fixes that are complete, or will stay as they are."""
+        return self._through(0, (fix,))
+
+    def push(self, role: str, part: Part) -> Sequence[GnssSample]:
+        """Return the fixes that this part completes."""
+        stage = self._stages.index(role)
+        return self._through(stage + 1, self._pairings[stage].push(part))
+
+    def advance(self, now_us: int) -> Sequence[GnssSample]:
+        """Return the fixes whose wait is over at inertial time `now_us`."""
+        fixes: Sequence[GnssSample] = ()
+        for stage, pairing in enumerate(self._pairings):
+            waited = pairing.advance(now_us) if pairing.waiting else ()
+            if waited:
+                fixes = [*fixes, *self._through(stage + 1, waited)]
+        return fixes
+
+    def flush(self) -> Sequence[GnssSample]:
+        """Give up waiting."""
+        fixes: list[GnssSample] = []
+        for stage, pairing in enumerate(self._pairings):
+            fixes += self._through(stage + 1, pairing.flush())
+        return fixes
+
+    def _through(self, stage: int, fixes: Sequence[GnssSample]) -> Sequence[GnssSample]:
+        """Take fixes through the pairings from a stage on."""
+        for pairing in self._pairings[stage:]:
+            fixes = [ready for fix in fixes for ready in pairing.push_fix(fix)]
+        return fixes
