@@ -205,6 +205,24 @@ class BaroParams:
                          px4='EKF2_BARO_NOISE', ecl='baro_noise')
     gate: float = param(5.0, 'Innovation gate of barometric and GNSS height.', unit='sigma',
                         min=1, max=100, px4='EKF2_BARO_GATE', ecl='baro_innov_gate')
+    pressure_error_forward: float = param(
+        0.0, 'Static pressure error over dynamic pressure of the airflow from ahead.', min=-2,
+        max=2, px4='EKF2_PCOEF_XP', ecl='static_pressure_coef_xp')
+    pressure_error_backward: float = param(
+        0.0, 'The same for the airflow from behind.', min=-2, max=2, px4='EKF2_PCOEF_XN',
+        ecl='static_pressure_coef_xn')
+    pressure_error_right: float = param(
+        0.0, 'The same for the airflow from the right.', min=-2, max=2, px4='EKF2_PCOEF_YP',
+        ecl='static_pressure_coef_yp')
+    pressure_error_left: float = param(
+        0.0, 'The same for the airflow from the left.', min=-2, max=2, px4='EKF2_PCOEF_YN',
+        ecl='static_pressure_coef_yn')
+    pressure_error_vertical: float = param(
+        0.0, 'The same for the airflow from above or below.', min=-2, max=2,
+        px4='EKF2_PCOEF_Z', ecl='static_pressure_coef_z')
+    pressure_error_max_airspeed: float = param(
+        20.0, 'Airspeed along an axis from which the correction grows no more.', unit='m/s',
+        min=0, max=100, px4='EKF2_ASPD_MAX', ecl='max_correction_airspeed')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -238,6 +256,95 @@ class TerrainParams:
     ground_clearance: float = param(0.1, 'Height of the body origin above ground at rest.',
                                     unit='m', min=0.01, max=10, px4='EKF2_MIN_RNG',
                                     ecl='rng_gnd_clearance')
+    use_range: bool = param(True, 'Estimate terrain height from the range finder.')
+    use_flow: bool = param(True, 'Estimate terrain height from optical flow and GNSS velocity '
+                           'while the range finder is silent.')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RangeParams:
+    """Range finder: height above ground along a body axis."""
+
+    delay_ms: float = param(5.0, 'Delay against the IMU.', unit='ms', min=0, max=300,
+                            px4='EKF2_RNG_DELAY', ecl='range_delay_ms')
+    noise: float = param(0.1, 'Range noise.', unit='m', min=0.01, max=10, px4='EKF2_RNG_NOISE',
+                         ecl='range_noise')
+    noise_by_range: float = param(0.0, 'Growth of the noise with range.', unit='m/m', min=0,
+                                  max=0.2, px4='EKF2_RNG_SFE', ecl='range_noise_scaler')
+    gate: float = param(5.0, 'Innovation gate of range height and terrain.', unit='sigma', min=1,
+                        max=100, px4='EKF2_RNG_GATE', ecl='range_innov_gate')
+    pitch: float = param(0.0, 'Pitch of the sensor axis against body down, nose up positive.',
+                         unit='rad', min=-0.75, max=0.75, px4='EKF2_RNG_PITCH',
+                         ecl='rng_sens_pitch')
+    min_cos_tilt: float = param(0.7071, 'Cosine of the tilt of the sensor axis beyond which '
+                                'range (and optical flow) are not used.', min=0.0, max=1.0,
+                                ecl='range_cos_max_tilt')
+    good_quality_time: float = param(1.0, 'Time without bad quality before range is used again.',
+                                     unit='s', min=0.1, max=5, px4='EKF2_RNG_QLTY_T',
+                                     ecl='range_valid_quality_s')
+    aid: bool = param(False, 'Take height from the range finder near the ground at low speed, '
+                      'whatever the height reference is.')
+    aid_max_height: float = param(5.0, 'Height above ground up to which range aid acts.',
+                                  unit='m', min=0.1, max=100, px4='EKF2_RNG_A_HMAX',
+                                  ecl='max_hagl_for_range_aid')
+    aid_max_speed: float = param(1.0, 'Horizontal speed up to which range aid acts.', unit='m/s',
+                                 min=0.1, max=20, px4='EKF2_RNG_A_VMAX',
+                                 ecl='max_vel_for_range_aid')
+    aid_gate: float = param(1.0, 'Terrain innovation up to which range aid acts.', unit='sigma',
+                            min=0.1, max=5, px4='EKF2_RNG_A_IGATE', ecl='range_aid_innov_gate')
+    position: Vector = param(ZERO, 'Sensor position in the body frame (FRD).', unit='m',
+                             ecl='rng_pos_body')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlowParams:
+    """Optical flow: angular rate of the ground seen by a camera along body down."""
+
+    enabled: bool = param(False, 'Use optical flow for horizontal velocity.')
+    delay_ms: float = param(5.0, 'Delay against the IMU, to the end of the exposure.', unit='ms',
+                            min=0, max=300, px4='EKF2_OF_DELAY', ecl='flow_delay_ms')
+    noise: float = param(0.15, 'Noise at the best quality, at least 0.05.', unit='rad/s',
+                         min=0.01, max=10,
+                         px4='EKF2_OF_N_MIN', ecl='flow_noise')
+    noise_at_min_quality: float = param(0.5, 'Noise at the lowest quality that is used.',
+                                        unit='rad/s', min=0.01, max=10, px4='EKF2_OF_N_MAX',
+                                        ecl='flow_noise_qual_min')
+    min_quality: int = param(1, 'Lowest quality that is used.', min=0, max=255,
+                             px4='EKF2_OF_QMIN', ecl='flow_qual_min')
+    gate: float = param(3.0, 'Innovation gate.', unit='sigma', min=1, max=100,
+                        px4='EKF2_OF_GATE', ecl='flow_innov_gate')
+    max_rate: float = param(2.5, 'Largest rate that the sensor can follow.', unit='rad/s', min=0,
+                            max=100)
+    position: Vector = param(ZERO, 'Sensor position in the body frame (FRD).', unit='m',
+                             ecl='flow_pos_body')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AirDataParams:
+    """Airspeed, zero sideslip and drag: what tells the wind."""
+
+    airspeed_noise: float = param(1.4, 'Noise of equivalent airspeed, taken to be 0.5 to 5.',
+                                  unit='m/s', min=0.1, max=20, px4='EKF2_EAS_NOISE',
+                                  ecl='eas_noise')
+    airspeed_gate: float = param(5.0, 'Innovation gate of airspeed.', unit='sigma', min=1,
+                                 max=100, px4='EKF2_TAS_GATE', ecl='tas_innov_gate')
+    sideslip_noise: float = param(0.3, 'Noise of the assumption of zero sideslip.', unit='rad',
+                                  min=0.01, max=1.0, px4='EKF2_BETA_NOISE', ecl='beta_noise')
+    sideslip_gate: float = param(5.0, 'Innovation gate of sideslip.', unit='sigma', min=1,
+                                 max=100, px4='EKF2_BETA_GATE', ecl='beta_innov_gate')
+    use_drag: bool = param(False, 'Estimate wind from the drag of a multirotor.')
+    drag_noise: float = param(2.5, 'Variance of the drag model, at least 0.5.',
+                              unit='(m/s^2)^2', min=0.01, max=100, px4='EKF2_DRAG_NOISE',
+                              ecl='drag_noise')
+    ballistic_coef_x: float = param(
+        100.0, 'Mass over drag area of the airflow along x; up to 1 = no such drag.',
+        unit='kg/m^2', min=0, max=200, px4='EKF2_BCOEF_X', ecl='bcoef_x')
+    ballistic_coef_y: float = param(
+        100.0, 'Mass over drag area of the airflow along y; up to 1 = no such drag.',
+        unit='kg/m^2', min=0, max=200, px4='EKF2_BCOEF_Y', ecl='bcoef_y')
+    momentum_drag_coef: float = param(
+        0.1, 'Drag of the propellers per airspeed across their axis; up to 0.001 = none.',
+        unit='1/s', min=0, max=1.0, px4='EKF2_MCOEF', ecl='mcoef')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -306,6 +413,9 @@ class Ekf2Params:
     height: HeightParams = field(default_factory=HeightParams)
     earth: EarthParams = field(default_factory=EarthParams)
     terrain: TerrainParams = field(default_factory=TerrainParams)
+    range: RangeParams = field(default_factory=RangeParams)
+    flow: FlowParams = field(default_factory=FlowParams)
+    air_data: AirDataParams = field(default_factory=AirDataParams)
     aiding: AidingParams = field(default_factory=AidingParams)
     output: OutputParams = field(default_factory=OutputParams)
     yaw_estimator: YawEstimatorParams = field(default_factory=YawEstimatorParams)

@@ -79,6 +79,10 @@ def _load_ecl(path: Path, base: Params) -> LoadedParams:
         group, _, rest = name.partition('.')
         special[group][rest] = foreign.pop(name)
     values, unused = _translated(path, foreign, base)
+    limits = special['vehicle'].get('flow_limits')
+    if limits is not None:
+        # largest rate, then heights that concern the controller only
+        values['ekf2.flow.max_rate'] = limits[0] if isinstance(limits, tuple) else limits
     return LoadedParams(_applied(path, base, values), unused, **special)
 
 

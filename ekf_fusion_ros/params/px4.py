@@ -21,9 +21,9 @@ CHECKS = 'nsats pdop hacc vacc sacc hdrift vdrift hspeed vspeed'.split()
 
 # One entry a bit: our parameter, or in words what the bit switches where we have nothing.
 AID_BITS = (
-    'ekf2.gnss.enabled', 'optical flow', 'ekf2.imu.inhibit_accel_bias',
-    'ekf2.vision.use_position', 'ekf2.vision.use_yaw', 'drag', 'ekf2.vision.rotate',
-    'ekf2.gnss.yaw', 'ekf2.vision.use_velocity',
+    'ekf2.gnss.enabled', 'ekf2.flow.enabled', 'ekf2.imu.inhibit_accel_bias',
+    'ekf2.vision.use_position', 'ekf2.vision.use_yaw', 'ekf2.air_data.use_drag',
+    'ekf2.vision.rotate', 'ekf2.gnss.yaw', 'ekf2.vision.use_velocity',
 )
 CHECK_BITS = tuple(f'ekf2.gnss.checks.{check}' for check in CHECKS)
 DECLINATION_BITS = (
@@ -33,6 +33,7 @@ GPS_CONTROL_BITS = (
     'ekf2.gnss.enabled', 'GNSS height beside the height reference',
     'GNSS velocity, which goes with position here', 'ekf2.gnss.yaw',
 )
+TERRAIN_BITS = ('ekf2.terrain.use_range', 'ekf2.terrain.use_flow')
 EV_CONTROL_BITS = (
     'ekf2.vision.use_position', 'vision height beside the height reference',
     'ekf2.vision.use_velocity', 'ekf2.vision.use_yaw',
@@ -45,6 +46,8 @@ BIT_MASKS = {
     'EKF2_GPS_CHECK': CHECK_BITS,
     'mag_declination_source': DECLINATION_BITS,
     'EKF2_DECL_TYPE': DECLINATION_BITS,
+    'terrain_fusion_mode': TERRAIN_BITS,
+    'EKF2_TERR_MASK': TERRAIN_BITS,
     'EKF2_EV_CTRL': EV_CONTROL_BITS,
     'EKF2_GPS_CTRL': GPS_CONTROL_BITS,
 }
@@ -60,6 +63,8 @@ SWITCHES = {
     'EKF2_MAG_CHECK': 'ekf2.mag.check_strength',
     'synthesize_mag_z': 'ekf2.mag.synthesize_z',
     'EKF2_SYNT_MAG_Z': 'ekf2.mag.synthesize_z',
+    'range_aid': 'ekf2.range.aid',
+    'EKF2_RNG_AID': 'ekf2.range.aid',
 }
 MICROSECONDS = {
     'valid_timeout_max': 'ekf2.aiding.valid_timeout',
@@ -73,6 +78,8 @@ AXES = {
     'EKF2_IMU_POS_': 'ekf2.imu.position',
     'EKF2_GPS_POS_': 'ekf2.gnss.position',
     'EKF2_EV_POS_': 'ekf2.vision.position',
+    'EKF2_RNG_POS_': 'ekf2.range.position',
+    'EKF2_OF_POS_': 'ekf2.flow.position',
 }
 
 

@@ -61,7 +61,8 @@ def test_ecl_file(tmp_path: Path) -> None:
     path.write_text(
         'fusion_mode=331\nvehicle.fixed_wing=1\nvehicle.flow_limits=6;0;50\noutput.every=5\n'
         'imu_pos_body=0.06;-0.04;0.03\nmag_fusion_type=4\nvalid_timeout_max=4000000\n'
-        'bcoef_x=25\nmag_declination_source=1\ncheck_mag_strength=1\n', encoding='utf-8')
+        'bcoef_x=25\nauxvel_noise=0.5\nterrain_fusion_mode=1\nrange_aid=1\n'
+        'mag_declination_source=1\ncheck_mag_strength=1\n', encoding='utf-8')
     loaded = load_file(path)
     ekf2 = loaded.params.ekf2
 
@@ -74,7 +75,12 @@ def test_ecl_file(tmp_path: Path) -> None:
     assert ekf2.aiding.valid_timeout == pytest.approx(4.0)
     assert loaded.vehicle == {'fixed_wing': 1.0, 'flow_limits': (6.0, 0.0, 50.0)}
     assert loaded.output == {'every': 5.0}
-    assert loaded.unused == ['fusion_mode bit 1 (optical flow)', 'bcoef_x']
+    assert loaded.unused == ['auxvel_noise']
+    assert ekf2.flow.enabled and not ekf2.air_data.use_drag
+    assert ekf2.flow.max_rate == 6.0
+    assert ekf2.air_data.ballistic_coef_x == 25.0
+    assert ekf2.terrain.use_range and not ekf2.terrain.use_flow
+    assert ekf2.range.aid
 
 
 def test_modern_vision_control_bits() -> None:
