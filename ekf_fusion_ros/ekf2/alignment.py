@@ -114,6 +114,8 @@ def initialise_covariance(f: Filter) -> None:
     position = max(gnss.pos_noise, 0.01) ** 2
     if f.flags.gps_hgt:
         height = max(VERTICAL_NOISE_RATIO * gnss.pos_noise, 0.01) ** 2
+    elif f.flags.rng_hgt:
+        height = max(f.params.range.noise, 0.01) ** 2
     else:
         height = max(f.params.baro.noise, 0.01) ** 2
     cov.set_variances(7, np.array((position, position, height)))

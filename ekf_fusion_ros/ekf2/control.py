@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import math
 
+from ekf_fusion_ros.ekf2.aid_sources.airspeed import Airspeed
+from ekf_fusion_ros.ekf2.aid_sources.auxiliary_velocity import AuxiliaryVelocity
 from ekf_fusion_ros.ekf2.aid_sources.barometer import Barometer
+from ekf_fusion_ros.ekf2.aid_sources.drag import Drag
 from ekf_fusion_ros.ekf2.aid_sources.fake_position import FakePosition
 from ekf_fusion_ros.ekf2.aid_sources.gnss import INTERMITTENT_US
 from ekf_fusion_ros.ekf2.aid_sources.gnss import Gnss
 from ekf_fusion_ros.ekf2.aid_sources.magnetometer import Magnetometer
+from ekf_fusion_ros.ekf2.aid_sources.optical_flow import OpticalFlow
+from ekf_fusion_ros.ekf2.aid_sources.range_finder import RangeFinder
+from ekf_fusion_ros.ekf2.aid_sources.sideslip import Sideslip
 from ekf_fusion_ros.ekf2.aid_sources.vision import Vision
 from ekf_fusion_ros.ekf2.alignment import initialise_covariance
 from ekf_fusion_ros.ekf2.covariance import rotation_vector_variances
@@ -17,22 +23,26 @@ from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.gnss_checks import GnssChecks
 from ekf_fusion_ros.ekf2.heading import HeadingFusion
 from ekf_fusion_ros.ekf2.height import Height
+from ekf_fusion_ros.ekf2.range_height import RangeHeight
 from ekf_fusion_ros.ekf2.resets import Resets
 from ekf_fusion_ros.ekf2.state import PD
+from ekf_fusion_ros.ekf2.state import SECOND
 from ekf_fusion_ros.ekf2.terrain import Terrain
 from ekf_fusion_ros.ekf2.validity import Validity
+from ekf_fusion_ros.ekf2.wind import Wind
 from ekf_fusion_ros.ekf2.yaw_estimator import YawEstimator
 from ekf_fusion_ros.ekf2.yaw_recovery import YawRecovery
 from ekf_fusion_ros.estimator import GeoPoint
 
 TILT_ALIGNED_VARIANCE = math.radians(3.0) ** 2
+AIRSPEED_RECENT_US = SECOND
 
 
 class Control:
     """Owns the aid sources and steps them in their order."""
 
-    def __init__(self, f: Filter, observation_length: int) -> None:
-        """Build the sources on a filter."""
+    def __init__(self, f: Filter, observation_length: int, imu_length: int) -> None:
+        """Build the sources on a filter; lengths of the buffers of samples and of periods."""
         self._f = f
         self.resets = Resets(f)
         self.heading = HeadingFusion(f)
@@ -42,9 +52,19 @@ class Control:
         self.mag = Magnetometer(f, self.resets, self.heading, self.terrain, observation_length)
         self.baro = Barometer(f, observation_length)
         recovery = YawRecovery(f, self.resets, self.bank)
-        self.gnss = Gnss(f, self.resets, self.checks, recovery, observation_length)
+        self.gnss = Gnss(f, self.resets, self.checks, recovery, observation_length,
+                         self.mag.align_to_course)
         self.vision = Vision(f, self.resets, self.heading, observation_length)
-        self.height = Height(f, self.resets, self.baro, self.gnss, self.checks, self.vision)
+        self.range = RangeFinder(f, observation_length)
+        self.flow = OpticalFlow(f, self.resets, self.terrain, self.checks, imu_length)
+        self.resets.flow_velocity = lambda: self.flow.velocity(self.range.cos_tilt)
+        self.wind = Wind(f)
+        self.airspeed = Airspeed(f, self.wind, observation_length)
+        self.sideslip = Sideslip(f, self.wind)
+        self.drag = Drag(f, self.wind, observation_length, imu_length)
+        self.aux_velocity = AuxiliaryVelocity(f, observation_length)
+        self.height = Height(f, self.resets, self.baro, self.gnss, self.checks, self.vision,
+                             RangeHeight(f, self.range, self.terrain))
         self.fake_position = FakePosition(f, self.resets)
         self.validity = Validity(f)
         self._active_before: tuple[bool, ...] = ()
@@ -52,7 +72,7 @@ class Control:
     def step(self) -> None:
         """Run every source once, then terrain and the yaw bank."""
         f = self._f
-        f.gps_hgt_before = f.flags.gps_hgt
+        f.gps_hgt_before, f.rng_hgt_before = f.flags.gps_hgt, f.flags.rng_hgt
         if not f.flags.tilt_align:
             self._check_tilt()
         yaw_was_aligned = f.flags.yaw_align
@@ -60,21 +80,33 @@ class Control:
         gnss_popped = self.gnss.pop()
         mag_popped = self.mag.pop()
         self.baro.pop()
+        self.range.pop()
+        self.flow.pop()
         vision_popped = self.vision.pop()
+        self.airspeed.pop()
 
         self.height.check_health()
-        self.mag.step(mag_popped)
+        self.mag.step(mag_popped, self.checks)
+        self.flow.step()
         self.gnss.step(gnss_popped)
+        self.wind.step()
+        self.airspeed.step()
+        self.sideslip.step()
+        self.drag.step(self.mag.inhibit_reset_request)
         self.height.step(gnss_popped, vision_popped)
         self.vision.step(vision_popped, self.checks, self.gnss.vision_yaw_forbidden)
+        self.aux_velocity.step()
         self.fake_position.step(self.checks)
         self.validity.step()
-        if self.heading.covariance_lost:
-            self.heading.covariance_lost = False
+        if self.heading.covariance_lost or f.covariance_lost:
+            self.heading.covariance_lost = f.covariance_lost = False
             initialise_covariance(f)
         if f.flags.yaw_align and not yaw_was_aligned:
             f.events.add(f.t_now, EventKind.YAW_ALIGNED)
-        self.terrain.step()
+        self.terrain.predict()
+        self.terrain.fuse_range(self.range)
+        self.flow.aid_terrain()
+        self.terrain.keep_below()
         self._step_bank(gnss_popped)
         self._note_activity()
 
@@ -112,23 +144,31 @@ class Control:
 
     def _step_bank(self, gnss_popped: bool) -> None:
         f = self._f
-        airspeed = f.params.yaw_estimator.default_airspeed if f.flags.fixed_wing else 0.0
-        self.bank.step(f.imu.increments, f.flags.in_air, airspeed, f.x, f.dt_avg)
+        self.bank.step(f.imu.increments, f.flags.in_air, self._bank_airspeed(), f.x, f.dt_avg)
         fix = f.fix
         if gnss_popped and fix is not None and fix.has_velocity and fix.vacc > 0.0:
             self.bank.set_velocity(fix.velocity, fix.vacc)
+
+    def _bank_airspeed(self) -> float:
+        """Return the last airspeed in m/s, what a fixed wing usually has where that is old."""
+        f = self._f
+        if f.flags.fixed_wing and f.late(f.airspeed_us, AIRSPEED_RECENT_US):
+            return f.params.yaw_estimator.default_airspeed
+        return 0.0 if f.airspeed is None else f.airspeed.true_airspeed
 
     def _note_activity(self) -> None:
         """Count starts and stops of each observation."""
         f = self._f
         flags, seen = f.flags, f.observations
         active = (flags.gps, flags.gps_hgt, flags.ev_pos, flags.ev_vel, flags.ev_hgt,
-                  flags.baro_hgt, flags.mag_3d, flags.mag_dec, flags.mag_hdg or flags.ev_yaw,
-                  f.holding_position)
+                  flags.baro_hgt, flags.mag_3d, flags.mag_dec,
+                  flags.mag_hdg or flags.ev_yaw or flags.gps_yaw, f.holding_position,
+                  flags.rng_hgt, flags.opt_flow, flags.fuse_aspd, flags.wind)
         if active == self._active_before:
             return
         self._active_before = active
-        gps, gps_hgt, ev_pos, ev_vel, ev_hgt, baro, mag_3d, mag_dec, yaw, holding = active
+        (gps, gps_hgt, ev_pos, ev_vel, ev_hgt, baro, mag_3d, mag_dec, yaw, holding, ranging,
+         flow, airspeed, wind) = active
         for record in (seen.gps_hor_pos, seen.gps_hor_vel, seen.gps_ver_vel):
             record.note_active(gps)
         seen.gps_height.note_active(gps_hgt)
@@ -141,3 +181,8 @@ class Control:
         seen.declination.note_active(mag_dec)
         seen.yaw.note_active(yaw)
         seen.fake_pos.note_active(holding)
+        seen.range_height.note_active(ranging)
+        seen.flow.note_active(flow)
+        seen.airspeed.note_active(airspeed)
+        seen.sideslip.note_active(wind and flags.fuse_beta)
+        seen.drag.note_active(wind and self.drag.enabled)

@@ -185,6 +185,13 @@ class Covariance:
         for i, variance in enumerate(variances):
             self.p[first + i, first + i] = variance
 
+    def set_block(self, first: int, block: Array) -> None:
+        """Decorrelate states from `first` on and give them a covariance (n, n) of their own."""
+        last = first + len(block)
+        self.p[first:last, :] = 0.0
+        self.p[:, first:last] = 0.0
+        self.p[first:last, first:last] = block
+
     def decorrelate_attitude(self) -> None:
         """Remove the correlations of the quaternion with all other states."""
         self.p[0:4, 4:] = 0.0

@@ -27,12 +27,16 @@ from ekf_fusion_ros.estimator import NavState
 from ekf_fusion_ros.kernels.prediction import advance_state
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 from ekf_fusion_ros.params.spec import validate
+from ekf_fusion_ros.samples import AirspeedSample
+from ekf_fusion_ros.samples import AuxVelocitySample
 from ekf_fusion_ros.samples import BaroSample
+from ekf_fusion_ros.samples import FlowSample
 from ekf_fusion_ros.samples import GnssSample
 from ekf_fusion_ros.samples import HeadingSample
 from ekf_fusion_ros.samples import ImuSample
 from ekf_fusion_ros.samples import LandedSample
 from ekf_fusion_ros.samples import MagSample
+from ekf_fusion_ros.samples import RangeSample
 from ekf_fusion_ros.samples import Sample
 from ekf_fusion_ros.samples import VisionSample
 
@@ -58,7 +62,7 @@ class Ekf2:
     def reset(self) -> None:
         """Forget everything but the parameters."""
         self.filter = Filter(self.params, self._imu_length)
-        self.control = Control(self.filter, self._observation_length)
+        self.control = Control(self.filter, self._observation_length, self._imu_length)
         self.inertial = InertialInput(self._imu_length, self._observation_length,
                                       self.params.imu.moving_scaler)
         self._alignment = Alignment(self.filter, self.control.mag, self.control.baro,
@@ -83,6 +87,14 @@ class Ekf2:
             self.control.vision.push(sample, self.inertial.min_interval_us)
         elif isinstance(sample, GnssSample):
             self._push_fix(sample)
+        elif isinstance(sample, RangeSample):
+            self.control.range.push(sample, self.inertial.min_interval_us)
+        elif isinstance(sample, FlowSample):
+            self.control.flow.push(sample, self.inertial.min_interval_us)
+        elif isinstance(sample, AirspeedSample):
+            self.control.airspeed.push(sample, self.inertial.min_interval_us)
+        elif isinstance(sample, AuxVelocitySample):
+            self.control.aux_velocity.push(sample, self.inertial.min_interval_us)
         elif isinstance(sample, HeadingSample):
             self.control.vision.heading.push(sample)
         elif isinstance(sample, LandedSample):
@@ -115,6 +127,7 @@ class Ekf2:
         self._period_complete = self.inertial.add(sample, f.flags.in_air)
         if self._period_complete:
             f.t_horizon = self.inertial.ring[0].time_us
+            self.control.drag.add(sample)
         f.flags.vehicle_at_rest = self.inertial.at_rest
         f.t_now = sample.time_us
         f.dt_imu_avg = self.inertial.dt_avg
@@ -194,4 +207,8 @@ def max_delay_ms(params: Ekf2Params) -> float:
     vision = params.vision
     if vision.use_position or vision.use_velocity or vision.use_yaw:
         delays.append(vision.delay_ms)
+    if params.range.aid or params.height.reference == 'range':
+        delays.append(params.range.delay_ms)
+    if params.flow.enabled:
+        delays.append(params.flow.delay_ms)
     return max(delays)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from ekf_fusion_ros.ekf2.output_predictor import OutputPredictor
 from ekf_fusion_ros.ekf2.state import FILTER_PERIOD
 from ekf_fusion_ros.ekf2.state import SIZE
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
+from ekf_fusion_ros.samples import AirspeedSample
 from ekf_fusion_ros.samples import VisionSample
 
 Array = NDArray[np.float64]
@@ -52,6 +54,8 @@ class GnssFix(NamedTuple):
     has_velocity: bool
     lat: float
     lon: float
+    yaw: float = math.nan
+    yaw_offset: float = 0.0
 
 
 class VerticalCheck(NamedTuple):
@@ -80,6 +84,13 @@ class Observations:
         self.declination = Observation('declination')
         self.fake_pos = Observation('fake_position', 2)
         self.fake_height = Observation('fake_height')
+        self.range_height = Observation('range_height')
+        self.hagl = Observation('height_above_ground')
+        self.flow = Observation('optical_flow', 2)
+        self.airspeed = Observation('airspeed')
+        self.sideslip = Observation('sideslip')
+        self.drag = Observation('drag', 2)
+        self.aux_vel = Observation('auxiliary_velocity', 2)
 
     def all(self) -> list[Observation]:
         """Return every record."""
@@ -99,6 +110,8 @@ class Filter:
         self.params = params
         self.gnss_lever = lever_arm(params.gnss.position, params)
         self.vision_lever = lever_arm(params.vision.position, params)
+        self.range_lever = lever_arm(params.range.position, params)
+        self.flow_lever = lever_arm(params.flow.position, params)
         self.x: Array = np.zeros(SIZE)
         self.x[0] = 1.0
         self.cov = Covariance(params)
@@ -111,6 +124,7 @@ class Filter:
         self.accel_lpf = np.zeros(2)
         self.flags = ControlFlags()
         self.gps_hgt_before = False
+        self.rng_hgt_before = False
         self.faults = FaultFlags()
         self.rejections = Rejections()
         self.times = FusionTimes()
@@ -125,11 +139,16 @@ class Filter:
         self.last_known_position = np.zeros(2)
         self.fix: GnssFix | None = None
         self.vision: VisionSample | None = None
+        self.airspeed: AirspeedSample | None = None
+        self.airspeed_us = 0
+        self.airspeed_popped = False
+        self.covariance_lost = False
         self.rot_ev: Array = np.eye(3)
         self.last_velocity: Sequence[float] = (0.0, 0.0)
         self.last_velocity_variance: Sequence[float] = (0.0, 0.0)
         self.holding_position = False
         self.dead_reckoning = True
+        self.wind_dead_reckoning = False
         self.last_aiding_us = 0
         self.yaw_reset_requested = False
 

@@ -109,6 +109,7 @@ class Rejections:
     flow_x: bool = False
     flow_y: bool = False
     mag_judged_after_height: bool = False
+    flow_judged_after_hagl: bool = False
 
 
 @dataclass(slots=True)

@@ -14,6 +14,7 @@ from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.fusion import fuse_vertical_position
 from ekf_fusion_ros.ekf2.gnss_checks import GnssChecks
 from ekf_fusion_ros.ekf2.observation import Observation
+from ekf_fusion_ros.ekf2.range_height import RangeHeight
 from ekf_fusion_ros.ekf2.resets import UNKNOWN_CLIMB_VARIANCE
 from ekf_fusion_ros.ekf2.resets import Resets
 from ekf_fusion_ros.ekf2.state import SECOND
@@ -37,14 +38,15 @@ class Height:
     """Selects the height source, resets to it after a time-out, and fuses it."""
 
     def __init__(self, f: Filter, resets: Resets, baro: Barometer, gnss: Gnss, checks: GnssChecks,
-                 vision: Vision) -> None:
-        """Act on a filter through its resets; the three sources are asked for their samples."""
+                 vision: Vision, ranging: RangeHeight) -> None:
+        """Act on a filter through its resets; the sources are asked for their samples."""
         self._f = f
         self._resets = resets
         self._baro = baro
         self._gnss = gnss
         self._checks = checks
         self._vision = vision
+        self._ranging = ranging
         self.offset = 0.0
         self._clips = 0
         self._time_bad_us = 0
@@ -107,6 +109,8 @@ class Height:
             recovered = self._recover_from_gnss()
         elif f.flags.ev_hgt:
             recovered = self._recover_from_vision()
+        elif self._ranging.finder.valid:
+            recovered = True
         else:
             recovered = self._recover_to_baro()
         if recovered:
@@ -139,6 +143,9 @@ class Height:
 
     def _recover_from_vision(self) -> bool:
         if self._f.recent(self._vision.buffer.newest_time_us, VISION_RECENT_US):
+            return True
+        if self._ranging.finder.valid:
+            self._select('range')
             return True
         return self._recover_to_baro()
 
@@ -191,6 +198,12 @@ class Height:
         self._select('vision')
         self.offset = 0.0
 
+    def _start_range(self, ground: float) -> None:
+        """Make range height the reference, over a ground at a down coordinate in m."""
+        self._select('range')
+        if not self._f.rng_hgt_before:
+            self.offset = ground
+
     # ---- reset ----
 
     def reset(self) -> None:
@@ -206,6 +219,8 @@ class Height:
                 down = self.offset - newest.altitude + f.earth.alt_ref
                 self._resets.vertical_position(down, newest.vacc ** 2)
                 self._baro.offset = self._baro.newest_altitude + down
+        elif f.flags.rng_hgt:
+            self._reset_to_range()
         elif f.flags.ev_hgt:
             self._reset_to_vision()
         if (f.flags.gps and not self._gnss.height_intermittent and newest is not None
@@ -214,6 +229,13 @@ class Height:
             self._resets.vertical_velocity(float(newest.velocity[2]), variance)
         else:
             self._resets.vertical_velocity(0.0, UNKNOWN_CLIMB_VARIANCE)
+
+    def _reset_to_range(self) -> None:
+        if not self._f.rng_hgt_before:
+            self.offset = self._ranging.ground()
+        down = self.offset - self._ranging.finder.height
+        self._resets.vertical_position(down, self._f.params.range.noise ** 2)
+        self._baro.offset = self._baro.newest_altitude + down
 
     def _reset_to_vision(self) -> None:
         f = self._f
@@ -233,18 +255,33 @@ class Height:
             self._prefer_gnss(gnss_popped)
         elif reference == 'vision':
             self._prefer_vision(vision_popped)
+        elif reference == 'range':
+            self._prefer_range()
         else:
             self._prefer_baro(gnss_popped)
         if not self._f.flags.baro_hgt and self._baro.popped:
             self._baro.follow()
+        if self._f.flags.rng_hgt and self._ranging.substitute_on_ground():
+            self._ranging.fuse(self.offset)
         if self._f.flags.has_height():
             self._last_known_down = float(self._f.x[9])
         else:
             self._hold()
 
+    def _prefer_range(self) -> None:
+        if self._ranging.finder.fresh:
+            self._start_range(self._ranging.ground())
+            self._ranging.fuse(self.offset)
+        else:
+            self._fall_back_to_baro()
+
     def _prefer_baro(self, gnss_popped: bool) -> None:
         f = self._f
-        if self._baro.popped and not self._baro.faulty:
+        near_ground = self._ranging.aids()
+        if near_ground and self._ranging.finder.fresh:
+            self._start_range(self._ranging.terrain_down())
+            self._ranging.fuse(self.offset)
+        elif not near_ground and self._baro.popped and not self._baro.faulty:
             self.start_baro()
             self._baro.fuse()
         elif f.flags.gps_hgt and gnss_popped and not self._gnss.height_intermittent:
@@ -256,10 +293,20 @@ class Height:
         may_start = (f.fix is not None and math.isfinite(f.fix.altitude)
                      and f.earth.has_origin and not self._gnss.height_intermittent
                      and self._checks.healthy_at_arrival)
-        if not f.flags.gps_hgt and may_start:
+        near_ground = self._ranging.aids()
+        if near_ground and self._ranging.finder.fresh and not f.rng_hgt_before:
+            self._start_range(self._ranging.terrain_down())
+        elif f.rng_hgt_before and not near_ground:
+            if may_start:
+                self.start_gnss()
+            elif not self._baro.faulty:
+                self.start_baro()
+        elif not f.flags.gps_hgt and not near_ground and may_start:
             self.start_gnss()
         if f.flags.gps_hgt and gnss_popped:
             self._fuse_gnss()
+        elif f.flags.rng_hgt and self._ranging.finder.fresh:
+            self._ranging.fuse(self.offset)
         else:
             self._fall_back_to_baro()
 
@@ -267,9 +314,12 @@ class Height:
         f = self._f
         if not f.flags.ev_hgt and f.recent(self._vision.last_arrival_us, VISION_RECENT_US):
             self.start_vision()
-            self.reset()
+            if not f.rng_hgt_before:
+                self.reset()
         if f.flags.ev_hgt and vision_popped:
             self._fuse_vision()
+        elif f.flags.rng_hgt and self._ranging.finder.fresh:
+            self._ranging.fuse(self.offset)
         else:
             self._fall_back_to_baro()
 
@@ -319,8 +369,10 @@ class Height:
                                    HOLD_GATE)
 
     def move(self, shift: float) -> None:
-        """Shift the held height down in m: the frame has moved, not the vehicle."""
+        """Shift the held height and the ground down in m: the frame has moved, not the vehicle."""
         self._last_known_down += shift
+        if self._f.flags.rng_hgt:
+            self.offset += shift
 
     def active_record(self) -> Observation | None:
         """Return the record of the selected source."""
@@ -329,4 +381,6 @@ class Height:
             return seen.baro_height
         if flags.gps_hgt:
             return seen.gps_height
+        if flags.rng_hgt:
+            return seen.range_height
         return seen.ev_height if flags.ev_hgt else None

@@ -68,5 +68,6 @@ class AccelBiasLearning:
         by_height = (
             (flags.baro_hgt and down_bias * seen.baro_height.innovation[0] < 0.0)
             or (flags.gps_hgt and down_bias * seen.gps_height.innovation[0] < 0.0)
+            or (flags.rng_hgt and down_bias * seen.range_height.innovation[0] < 0.0)
             or (flags.ev_hgt and down_bias * seen.ev_height.innovation[0] < 0.0))
         return by_velocity and by_height

@@ -113,8 +113,10 @@ def _sources(ekf: Ekf2) -> str:
         (flags.gps, 'GNSS'), (flags.ev_pos, 'odometry position'),
         (flags.ev_vel, 'odometry velocity'), (flags.ev_yaw, 'odometry yaw'),
         (flags.mag_3d, '3-axis magnetometer'), (flags.mag_hdg, 'magnetic heading'),
+        (flags.gps_yaw, 'antenna yaw'), (flags.opt_flow, 'optical flow'),
+        (flags.fuse_aspd, 'airspeed'),
         (flags.baro_hgt, 'barometric height'), (flags.gps_hgt, 'GNSS height'),
-        (flags.ev_hgt, 'odometry height'))
+        (flags.rng_hgt, 'range height'), (flags.ev_hgt, 'odometry height'))
     return 'fusing ' + (', '.join(word for on, word in words if on) or 'nothing')
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -60,6 +62,7 @@ class Resets:
         """Act on a filter."""
         self._f = f
         self.counters = ResetCounters()
+        self.flow_velocity: Callable[[], tuple[Array, Array]] | None = None
 
     def yaw(
         self, yaw: float, variance: float, *, shift_output: bool = True,
@@ -145,6 +148,9 @@ class Resets:
         f = self._f
         if f.flags.gps and gnss_healthy and f.fix is not None and f.fix.has_velocity:
             self.velocity_to_fix()
+        elif f.flags.opt_flow and self.flow_velocity is not None:
+            f.events.add(f.t_now, EventKind.VEL_RESET_FLOW)
+            self.horizontal_velocity(*self.flow_velocity())
         elif f.flags.ev_vel and f.vision is not None and f.vision.has_velocity:
             f.events.add(f.t_now, EventKind.VEL_RESET_VISION)
             turned, spread = vision_velocity_in_filter_frame(f, f.vision)

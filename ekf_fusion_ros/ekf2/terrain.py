@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from ekf_fusion_ros.ekf2.aid_sources.range_finder import RangeFinder
 from ekf_fusion_ros.ekf2.filter import Filter
+from ekf_fusion_ros.ekf2.scalar import gate_ratio
+from ekf_fusion_ros.ekf2.scalar import passes
 from ekf_fusion_ros.ekf2.state import PD
 from ekf_fusion_ros.ekf2.state import SECOND
 from ekf_fusion_ros.ekf2.state import VE
@@ -10,6 +13,7 @@ from ekf_fusion_ros.ekf2.state import VN
 
 VARIANCE_MAX = 1e4
 VALID_US = 5 * SECOND
+RESET_US = 10 * SECOND
 
 
 class Terrain:
@@ -38,8 +42,11 @@ class Terrain:
         self.down += shift
         self._last_on_ground_down += shift
 
-    def step(self) -> None:
-        """Run once per filter period, after all fusion."""
+    def predict(self) -> None:
+        """Hold the ground below a vehicle that stands on it, else let it become uncertain.
+
+        Once per filter period, after all fusion and before that of `fuse_range` and `fuse_flow`.
+        """
         f = self._f
         down = f.x.item(PD)
         if not f.flags.in_air:
@@ -55,8 +62,64 @@ class Terrain:
             growth = ((dt * params.process_noise) ** 2
                       + (dt * params.gradient) ** 2 * speed_squared)
             self.variance = min(max(self.variance + growth, 0.0), VARIANCE_MAX)
-        highest = down + f.params.terrain.ground_clearance
+
+    def keep_below(self) -> None:
+        """Keep the ground below the vehicle."""
+        highest = self._f.x.item(PD) + self._f.params.terrain.ground_clearance
         self.down = max(self.down, highest)
+
+    def fuse_range(self, finder: RangeFinder) -> None:
+        """Fuse a fresh height above ground in flight; reset to it when refused for too long."""
+        f = self._f
+        if not finder.fresh or not f.flags.in_air or not f.params.terrain.use_range:
+            return
+        params = f.params.range
+        innovation = self.down - float(f.x[PD]) - finder.height
+        noise = params.noise ** 2 + (params.noise_by_range * finder.distance) ** 2
+        variance = self.variance + noise
+        if passes(f, f.observations.hagl, innovation, variance, params.gate):
+            gain = self.variance / variance
+            self.down -= gain * innovation
+            self.variance *= 1.0 - gain
+            f.times.hagl = f.t_now
+            self._note_rejection(False)
+        elif f.late(f.times.hagl, RESET_US):
+            self.down = float(f.x[PD]) + finder.height
+            self.variance = noise
+        else:
+            self._note_rejection(True)
+
+    def _note_rejection(self, rejected: bool) -> None:
+        self._f.rejections.hagl = rejected
+        self._f.rejections.flow_judged_after_hagl = False
+
+    def fuse_flow(
+        self, rate: tuple[float, float], velocity: tuple[float, float], cos_tilt: float,
+        noise: float, gate: float,
+    ) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Fuse the flow rate in rad/s about x and y at a body velocity along x and y in m/s.
+
+        cos_tilt: cosine of the tilt of the camera axis; noise in (rad/s)^2. Returns innovations
+        and their variances. The predicted rate is v cos_tilt / h with the height h above ground
+        before the first axis.
+        """
+        f = self._f
+        self.keep_below()
+        per_height = 1.0 / (self.down - float(f.x[PD]))
+        innovations, variances = [], []
+        for measured, speed in ((rate[0], velocity[1]), (rate[1], -velocity[0])):
+            predicted = speed * cos_tilt * per_height
+            h = predicted * per_height
+            variance = h * h * self.variance + noise
+            innovation = predicted - measured
+            if gate_ratio(innovation, variance, gate) <= 1.0:
+                gain = self.variance * h / variance
+                self.down += gain * innovation
+                self.variance = max(self.variance * (1.0 - gain * h), 0.0)
+                f.times.flow_terrain = f.t_now
+            innovations.append(innovation)
+            variances.append(variance)
+        return (innovations[0], innovations[1]), (variances[0], variances[1])
 
     @property
     def valid(self) -> bool:

@@ -26,6 +26,7 @@ class Validity:
         flow_aided = flags.opt_flow and f.recent(times.flow, AIDING_RECENT_US)
         air_aided = (flags.wind and f.recent(times.airspeed, AIDING_RECENT_US)
                      and f.recent(times.sideslip, AIDING_RECENT_US))
+        f.wind_dead_reckoning = air_aided and not aided and not flow_aided
         f.dead_reckoning = not aided and not flow_aided and not air_aided
         if not f.dead_reckoning:
             f.last_aiding_us = f.t_now - AIDING_RECENT_US

@@ -116,8 +116,10 @@ def _rejections(ekf: Ekf2) -> int:
     r = ekf.filter.rejections
     # bit 3 is shared: the 3-axis magnetometer writes its x axis where height writes its verdict
     bit3 = r.mag_x if r.mag_judged_after_height else r.ver_pos
+    # and bit 10: height above ground and flow about x
+    bit10 = r.flow_x if r.flow_judged_after_hagl else r.hagl
     return word([r.hor_vel, r.ver_vel, r.hor_pos, bit3, r.mag_y, r.mag_z, False, r.yaw,
-                 r.airspeed, r.sideslip, r.hagl or r.flow_x, r.flow_y])
+                 r.airspeed, r.sideslip, bit10, r.flow_y])
 
 
 def _solution_status(ekf: Ekf2) -> int:
@@ -160,10 +162,12 @@ def _summary(ekf: Ekf2) -> list[float]:
     if flags.ev_pos:
         position = max(seen.ev_hor_pos.test_ratio, tiny,
                        0.0 if math.isnan(position) else position)
+    if flags.opt_flow and not flags.aided_other_than(flags.opt_flow):
+        velocity = max(seen.flow.test_ratio, tiny)
     height = ekf.control.height.active_record()
     return [math.sqrt(max(seen.yaw.test_ratio, seen.mag.test_ratio)), math.sqrt(velocity),
             math.sqrt(position), math.nan if height is None else math.sqrt(height.test_ratio),
-            0.0, 0.0, 0.0]
+            *(math.sqrt(r.test_ratio) for r in (seen.airspeed, seen.hagl, seen.sideslip))]
 
 
 def _ratios(ekf: Ekf2) -> list[float]:
@@ -172,8 +176,10 @@ def _ratios(ekf: Ekf2) -> list[float]:
         seen.gps_hor_vel.test_ratio, seen.gps_ver_vel.test_ratio,
         _horizontal_position(ekf).test_ratio, seen.gps_height.test_ratio,
         seen.ev_hor_vel.test_ratio, seen.ev_ver_vel.test_ratio, seen.ev_hor_pos.test_ratio,
-        seen.ev_height.test_ratio, seen.baro_height.test_ratio, 0.0, seen.yaw.test_ratio,
-        seen.mag.test_ratio, 0.0, 0.0, 0.0, 0.0, 0.0]
+        seen.ev_height.test_ratio, seen.baro_height.test_ratio,
+        seen.range_height.test_ratio, seen.yaw.test_ratio, seen.mag.test_ratio,
+        seen.airspeed.test_ratio, seen.sideslip.test_ratio, seen.hagl.test_ratio,
+        seen.flow.test_ratio, seen.aux_vel.test_ratio]
 
 
 def _components(ekf: Ekf2, kind: str) -> list[float]:
@@ -190,6 +196,9 @@ def _tail(ekf: Ekf2) -> list[float]:
     bank, count = ekf.control.bank, ekf.control.resets.counters
     running = bank.running
     origin = f.earth.origin()
+    seen = f.observations
+    further = (seen.range_height, seen.airspeed, seen.sideslip, seen.drag, seen.flow, seen.hagl,
+               seen.aux_vel)
     place = [math.nan] * 3 if origin is None else [origin.lat, origin.lon, origin.alt]
     return [
         bank.yaw if running else math.nan, bank.variance if running else math.nan,
@@ -197,4 +206,5 @@ def _tail(ekf: Ekf2) -> list[float]:
         count.quat % 256, count.vel_ne % 256, count.vel_d % 256, count.pos_ne % 256,
         count.pos_d % 256, int(f.dead_reckoning),
         *count.d_quat.tolist(), *count.d_vel_ne.tolist(), count.d_vel_d,
-        *count.d_pos_ne.tolist(), count.d_pos_d, int(ekf.control.terrain.valid), *[0.0] * 10]
+        *count.d_pos_ne.tolist(), count.d_pos_d, int(ekf.control.terrain.valid),
+        *(value for record in further for value in record.innovation)]

@@ -9,6 +9,8 @@ from ekf_fusion_ros.buffer import SampleBuffer
 from ekf_fusion_ros.ekf2.averaging import SampleAverage
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.fusion import fuse_vertical_position
+from ekf_fusion_ros.ekf2.static_pressure import has_pressure_error
+from ekf_fusion_ros.ekf2.static_pressure import pressure_error_height
 from ekf_fusion_ros.samples import BaroSample
 
 Array = NDArray[np.float64]
@@ -26,6 +28,7 @@ class Barometer:
         """Act on a filter."""
         self._f = f
         self._average = SampleAverage(1)
+        self._has_pressure_error = has_pressure_error(f.params.baro)
         self.buffer: SampleBuffer[Array] = SampleBuffer(capacity)
         self.offset = 0.0
         self.count = 0
@@ -40,8 +43,12 @@ class Barometer:
         delay_us = round(self._f.params.baro.delay_ms * 1000)
         mean = self._average.add(sample.time_us, np.array((sample.altitude,)), min_interval_us,
                                  delay_us)
-        if mean is not None:
-            self.buffer.push(*mean)
+        if mean is None:
+            return
+        stamp, value = mean
+        if self._has_pressure_error:
+            value = value + pressure_error_height(self._f)
+        self.buffer.push(stamp, value)
 
     def pop(self) -> None:
         """Take the sample at the horizon, and judge whether samples keep coming."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.buffer import SampleBuffer
+from ekf_fusion_ros.ekf2.aid_sources.gnss_yaw import GnssYaw
 from ekf_fusion_ros.ekf2.events import EventKind
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.filter import GnssFix
@@ -49,12 +51,17 @@ class Gnss:
     """Observes fixes behind the horizon; starts, continues, resets or stops their fusion."""
 
     def __init__(self, f: Filter, resets: Resets, checks: GnssChecks, recovery: YawRecovery,
-                 capacity: int) -> None:
-        """Act on a filter through its resets and the yaw recovery."""
+                 capacity: int, align_to_course: Callable[[], bool]) -> None:
+        """Act on a filter through its resets and the yaw recovery.
+
+        align_to_course checks the yaw of a fixed wing after a time-out; True when done.
+        """
         self._f = f
         self._resets = resets
         self._checks = checks
         self._recovery = recovery
+        self._align_to_course = align_to_course
+        self._yaw = GnssYaw(f, resets)
         self.buffer: SampleBuffer[GnssFix] = SampleBuffer(capacity)
         self.last_arrival_us = 0
         self.height_intermittent = True
@@ -88,7 +95,7 @@ class Gnss:
         delay_us = round(f.params.gnss.delay_ms * 1000) + FILTER_PERIOD_US // 2
         fix = GnssFix(sample.time_us - delay_us, np.zeros(2), sample.alt, sample.velocity,
                       sample.eph, sample.epv, sample.sacc, sample.has_velocity, sample.lat,
-                      sample.lon)
+                      sample.lon, sample.yaw, sample.yaw_offset)
         self.buffer.push(fix.time_us, self._placed(fix))
         return origin_set
 
@@ -154,6 +161,9 @@ class Gnss:
         if not popped:
             self._watch_silence()
             return
+        assert f.fix is not None
+        self._yaw.step(f.fix, self._checks.passing, self._checks.failing,
+                       self.height_intermittent)
         if not f.flags.gps:
             self._recovery.align_without_gnss()
         self._start_or_stop()
@@ -212,7 +222,12 @@ class Gnss:
         if not f.flags.opt_flow and f.fix.has_velocity:
             self._resets.velocity_to_fix()
         f.flags.gps = True
-        f.times.hor_pos = f.times.hor_vel = f.t_now
+        if not self._flies_on_wings():
+            # otherwise what follows a time-out is wanted too: a check of yaw by the course
+            f.times.hor_pos = f.times.hor_vel = f.t_now
+
+    def _flies_on_wings(self) -> bool:
+        return self._f.flags.fixed_wing and self._f.flags.in_air
 
     def _continues(self) -> bool:
         """True where the position kept by dead reckoning since the last fix passes the gate."""
@@ -255,6 +270,8 @@ class Gnss:
             return
         if timed_out:
             f.events.add(f.t_now, EventKind.GPS_FUSION_TIMEOUT)
+            if self._flies_on_wings():
+                f.flags.mag_aligned_in_flight = self._align_to_course()
             self._resets.velocity_to_aiding(self._checks.healthy)
             self._resets.position_to_aiding()
             f.times.hor_pos = f.times.hor_vel = f.t_now

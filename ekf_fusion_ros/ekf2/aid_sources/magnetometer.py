@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.buffer import SampleBuffer
+from ekf_fusion_ros.ekf2.aid_sources.magnetic_course import CourseAlignment
 from ekf_fusion_ros.ekf2.aid_sources.magnetic_fusion import declination
 from ekf_fusion_ros.ekf2.aid_sources.magnetic_fusion import fuse_declination
 from ekf_fusion_ros.ekf2.aid_sources.magnetic_fusion import fuse_three_axes
@@ -15,6 +16,7 @@ from ekf_fusion_ros.ekf2.aid_sources.magnetic_fusion import start_field_from
 from ekf_fusion_ros.ekf2.aid_sources.magnetic_fusion import synthetic_z
 from ekf_fusion_ros.ekf2.averaging import SampleAverage
 from ekf_fusion_ros.ekf2.filter import Filter
+from ekf_fusion_ros.ekf2.gnss_checks import GnssChecks
 from ekf_fusion_ros.ekf2.heading import PSEUDO_YAW_NOISE
 from ekf_fusion_ros.ekf2.heading import HeadingFusion
 from ekf_fusion_ros.ekf2.heading import mag_yaw
@@ -57,6 +59,7 @@ class Magnetometer:
         self._resets = resets
         self._heading = heading
         self._terrain = terrain
+        self._course = CourseAlignment(f, resets)
         self.average = SampleAverage(3)
         self.buffer: SampleBuffer[Array] = SampleBuffer(capacity)
         self.lpf = np.zeros(3)
@@ -107,7 +110,7 @@ class Magnetometer:
         if z is not None:
             self.field = np.array((measured[0], measured[1], z))
 
-    def step(self, popped: bool) -> None:
+    def step(self, popped: bool, checks: GnssChecks) -> None:
         """Run once per filter period; popped: a new sample is in `field`."""
         f = self._f
         flags = f.flags
@@ -115,6 +118,7 @@ class Magnetometer:
             flags.mag_disturbed = self._strength_implausible()
         if not flags.in_air:
             flags.mag_aligned_in_flight = False
+            self._course.land()
         no_other_yaw = not flags.ev_yaw and not flags.gps_yaw
         if f.params.mag.type == 'none' or flags.mag_fault or not flags.tilt_align:
             self.stop()
@@ -129,6 +133,10 @@ class Magnetometer:
             return
         self._select()
         self._realign_yaw_if_requested()
+        if flags.in_air and self._course.must_reset:
+            self._course.must_reset = False
+            self._resets.velocity_to_aiding(checks.healthy)
+            self._resets.position_to_aiding()
         if flags.yaw_align:
             self._fuse()
 
@@ -185,10 +193,7 @@ class Magnetometer:
         if f.flags.in_air and not f.flags.mag_aligned_in_flight:
             clear_of_ground = self._terrain.ground_down() - f.x[9] > ANOMALY_HEIGHT
             f.yaw_reset_requested |= bool(clear_of_ground)
-        may_reset = not f.flags.mag_disturbed and f.params.mag.type != 'none'
-        if not f.yaw_reset_requested or self._inhibited or not may_reset:
-            return
-        if not self.reset_heading():
+        if not f.yaw_reset_requested or self._inhibited or not self._align():
             return
         f.yaw_reset_requested = False
         f.flags.yaw_align = True
@@ -198,6 +203,21 @@ class Magnetometer:
             self.inhibit_reset_request = False
             bias_variance = (f.params.imu.switch_on_gyro_bias * FILTER_PERIOD) ** 2
             f.cov.set_variances(12, np.array((bias_variance,)))
+
+    def _align(self) -> bool:
+        if self._f.flags.in_air and self._f.flags.fixed_wing:
+            return self.align_to_course()
+        return not self._f.flags.mag_disturbed and self.reset_heading()
+
+    def align_to_course(self) -> bool:
+        """Check yaw of a fixed wing by the course of the fixes, or take it from the field."""
+        fix = self._course.usable_fix()
+        if fix is None:
+            return self.reset_heading()
+        self._course.align(fix, self.field)
+        self._declination_done = False
+        self.aligned_us = self._f.t_horizon
+        return True
 
     def reset_heading(self, *, initial: bool = False) -> bool:
         """Set yaw and earth field from the filtered field; True when done or not needed."""
