@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from dataclasses import field
+import math
 
 import numpy as np
 
@@ -11,11 +12,16 @@ from ekf_fusion_ros.ekf2.ekf2 import Ekf2
 from ekf_fusion_ros.mathlib.rotation import matrix_from_euler_321
 from ekf_fusion_ros.mathlib.rotation import quat_from_matrix
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
+from ekf_fusion_ros.samples import NAN3
+from ekf_fusion_ros.samples import AirspeedSample
+from ekf_fusion_ros.samples import AuxVelocitySample
 from ekf_fusion_ros.samples import BaroSample
+from ekf_fusion_ros.samples import FlowSample
 from ekf_fusion_ros.samples import GnssSample
 from ekf_fusion_ros.samples import ImuSample
 from ekf_fusion_ros.samples import LandedSample
 from ekf_fusion_ros.samples import MagSample
+from ekf_fusion_ros.samples import RangeSample
 from ekf_fusion_ros.samples import Sample
 from ekf_fusion_ros.samples import VelocityFrame
 from ekf_fusion_ros.samples import VisionSample
@@ -23,7 +29,10 @@ from ekf_fusion_ros.samples import VisionSample
 GRAVITY = 9.80665
 EARTH_FIELD = np.array((0.2, 0.0, 0.4))
 STEP_US = 10_000
-PERIODS_US = {'mag': 20_000, 'baro': 20_000, 'vision': 30_000, 'fix': 200_000}
+PERIODS_US = {'mag': 20_000, 'baro': 20_000, 'vision': 30_000, 'fix': 200_000, 'range': 50_000,
+              'flow': 20_000, 'airspeed': 100_000, 'aux': 100_000}
+METRES_PER_DEGREE = 111_180.0
+"""Of latitude, on the ellipsoid at 47.36 N."""
 
 
 @dataclass
@@ -39,6 +48,8 @@ class Fix:
     eph: float = 0.5
     epv: float = 0.8
     sacc: float = 0.2
+    yaw: float = math.nan
+    yaw_offset: float = 0.0
 
 
 @dataclass
@@ -51,6 +62,15 @@ class Odometry:
     position_var: np.ndarray = field(default_factory=lambda: np.full(3, 0.1))
     velocity_cov: np.ndarray = field(default_factory=lambda: 0.1 * np.eye(3))
     frame: VelocityFrame = VelocityFrame.LOCAL_FRD
+
+
+@dataclass
+class Flow:
+    """What the camera sees: rate of the scene about x and y, minus the rate of the body."""
+
+    rate: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    gyro: np.ndarray = field(default_factory=lambda: NAN3)
+    quality: int = 255
 
 
 class Bench:
@@ -71,6 +91,11 @@ class Bench:
         self.altitude = 122.2
         self.fix = Fix()
         self.odometry = Odometry(quaternion=quat_from_matrix(self.rot))
+        self.flow = Flow()
+        self.distance = 0.2
+        self.distance_quality = 100
+        self.airspeed = 0.0
+        self.aux_velocity = np.zeros(3)
         self.sending = {'mag', 'baro'}
         self.turned = 0.0
         self.now_us = 0
@@ -87,9 +112,22 @@ class Bench:
                                     self.clipping))
             self.ekf.update()
 
-    def fly(self) -> None:
+    def travel(self, speed: float, seconds: float) -> None:
+        """Let fixes go north, brought to a speed in m/s by 1 m/s^2 of the accelerometer."""
+        dt, at_rest = 1e-6 * STEP_US, self.force
+        for _ in range(round(seconds / dt)):
+            before = self.fix.velocity[0]
+            after = before + min(max(speed - before, -dt), dt)
+            self.fix.velocity = np.array((after, 0.0, 0.0))
+            self.fix.lat += dt * 0.5 * (before + after) / METRES_PER_DEGREE
+            self.force = at_rest + self.rot.T @ np.array(((after - before) / dt, 0.0, 0.0))
+            self.run(dt)
+        self.force = at_rest
+
+    def fly(self, *, on_wings: bool = False) -> None:
         """Tell the filter that the vehicle has left the ground."""
-        self.ekf.push(LandedSample(self.now_us, landed=False))
+        self.ekf.push(LandedSample(self.now_us, landed=False, fixed_wing=on_wings,
+                                   fuse_beta=on_wings))
 
     def _sample(self, sensor: str) -> Sample:
         if sensor == 'mag':
@@ -99,7 +137,18 @@ class Bench:
         if sensor == 'fix':
             fix = self.fix
             return GnssSample(self.now_us, fix.lat, fix.lon, fix.alt, fix.eph, fix.epv,
-                              fix.velocity.copy(), fix.sacc, nsats=fix.nsats, pdop=fix.pdop)
+                              fix.velocity.copy(), fix.sacc, nsats=fix.nsats, pdop=fix.pdop,
+                              yaw=fix.yaw, yaw_offset=fix.yaw_offset)
+        if sensor == 'range':
+            return RangeSample(self.now_us, self.distance, self.distance_quality)
+        if sensor == 'flow':
+            dt = 1e-6 * PERIODS_US['flow']
+            return FlowSample(self.now_us, self.flow.rate * dt, self.flow.gyro * dt,
+                              self.flow.quality, dt)
+        if sensor == 'airspeed':
+            return AirspeedSample(self.now_us, self.airspeed, 1.0)
+        if sensor == 'aux':
+            return AuxVelocitySample(self.now_us, self.aux_velocity.copy(), np.full(3, 0.01))
         odometry = self.odometry
         return VisionSample(self.now_us, odometry.position.copy(), odometry.quaternion.copy(),
                             odometry.velocity.copy(), odometry.position_var.copy(),
