@@ -33,7 +33,7 @@ LAYERS = (
 )
 LEVEL = {part: level for level, parts in enumerate(LAYERS) for part in parts}
 STRANGERS = ({'ekf2', 'lpe'}, {'node', 'replay'})
-FAMILIES = ({'magnetometer', 'magnetic_fusion'},)
+FAMILIES = ({'magnetometer', 'magnetic_fusion', 'magnetic_course'},)
 CORE = {part for parts in LAYERS[:7] for part in parts}
 
 MESSAGES = {
