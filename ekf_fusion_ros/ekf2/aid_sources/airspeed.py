@@ -42,6 +42,9 @@ class Airspeed:
     def pop(self) -> None:
         """Take the sample at the horizon."""
         f = self._f
+        f.airspeed_popped = False
+        if not self._last_arrival_us:
+            return
         popped = self.buffer.pop_first_older_than(f.t_horizon)
         f.airspeed_popped = popped is not None
         if popped is not None:

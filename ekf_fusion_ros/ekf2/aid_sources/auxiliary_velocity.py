@@ -33,7 +33,7 @@ class AuxiliaryVelocity:
     def step(self) -> None:
         """Run once per filter period."""
         f = self._f
-        if not self.buffer:
+        if not self._last_arrival_us:
             return
         popped = self.buffer.pop_first_older_than(f.t_horizon)
         if popped is None or not f.flags.aided_horizontally():

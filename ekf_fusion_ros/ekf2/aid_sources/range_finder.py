@@ -59,17 +59,17 @@ class RangeFinder:
     def pop(self) -> None:
         """Take the sample at the horizon and judge it; once per filter period."""
         now = self._f.t_horizon
+        if not self._last_arrival_us:
+            self._note_age(now)
+            return
         self.fresh = False
-        popped = None
-        if self._last_arrival_us:
-            self._cos_tilt = self._tilt()
-            popped = self.buffer.pop_first_older_than(now)
-            if popped is not None:
-                self.time_us = popped[0]
-                self.distance = popped[1].distance
+        self._cos_tilt = self._tilt()
+        popped = self.buffer.pop_first_older_than(now)
+        if popped is not None:
+            self.time_us = popped[0]
+            self.distance = popped[1].distance
         age = now - self.time_us
-        self._interval_us = min(
-            self._interval_us + INTERVAL_SHARE * (age - self._interval_us), INTERVAL_LIMIT_US)
+        self._note_age(age)
         self.regular = age <= STALE_US and self._interval_us < INTERVAL_MAX_US
         if not self.regular:
             self.valid = False
@@ -93,6 +93,10 @@ class RangeFinder:
         """Take a distance in m that is known otherwise for a fresh and valid sample."""
         self.distance = distance
         self.valid = self.fresh = True
+
+    def _note_age(self, age_us: int) -> None:
+        mean = self._interval_us
+        self._interval_us = min(mean + INTERVAL_SHARE * (age_us - mean), INTERVAL_LIMIT_US)
 
     def _tilt(self) -> float:
         rot = self._f.rot
