@@ -7,26 +7,17 @@ from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.observation import Observation
+from ekf_fusion_ros.kernels.update import test_ratio
 
 Array = NDArray[np.float64]
-
-
-def gate_ratio(innovation: float, variance: float, gate: float) -> float:
-    """Return innovation^2 / (gate^2 variance); the gate is at least one sigma."""
-    gate = max(gate, 1.0)
-    return innovation * innovation / (gate * gate * variance)
 
 
 def passes(
     f: Filter, record: Observation, innovation: float, variance: float, gate: float,
 ) -> bool:
     """Take an attempt down in its record; True, and counted as fused, where it passes its gate."""
-    record.record(f.t_now, (innovation,), (variance,), gate_ratio(innovation, variance, gate))
-    if record.test_ratio > 1.0:
-        record.reject()
-        return False
-    record.accept()
-    return True
+    ratio = test_ratio(innovation, variance, gate)
+    return record.judge(f.t_now, (innovation,), (variance,), ratio)
 
 
 def fuse_scalar(

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from ekf_fusion_ros.ekf2.aid_sources.range_finder import RangeFinder
 from ekf_fusion_ros.ekf2.filter import Filter
-from ekf_fusion_ros.ekf2.scalar import gate_ratio
 from ekf_fusion_ros.ekf2.scalar import passes
 from ekf_fusion_ros.ekf2.state import PD
 from ekf_fusion_ros.ekf2.state import SECOND
 from ekf_fusion_ros.ekf2.state import VE
 from ekf_fusion_ros.ekf2.state import VN
+from ekf_fusion_ros.kernels.update import test_ratio
 
 VARIANCE_MAX = 1e4
 VALID_US = 5 * SECOND
@@ -112,7 +112,7 @@ class Terrain:
             h = predicted * per_height
             variance = h * h * self.variance + noise
             innovation = predicted - measured
-            if gate_ratio(innovation, variance, gate) <= 1.0:
+            if test_ratio(innovation, variance, gate) <= 1.0:
                 gain = self.variance * h / variance
                 self.down += gain * innovation
                 self.variance = max(self.variance * (1.0 - gain * h), 0.0)

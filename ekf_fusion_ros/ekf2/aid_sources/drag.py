@@ -12,11 +12,11 @@ import numpy as np
 from ekf_fusion_ros.buffer import SampleBuffer
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.scalar import fuse_scalar
-from ekf_fusion_ros.ekf2.scalar import gate_ratio
 from ekf_fusion_ros.ekf2.wind import Wind
 from ekf_fusion_ros.kernels.air_data import predict_drag
 from ekf_fusion_ros.kernels.air_data import relative_wind
 from ekf_fusion_ros.kernels.innovation import project
+from ekf_fusion_ros.kernels.update import test_ratio
 from ekf_fusion_ros.samples import ImuSample
 
 AIR_DENSITY = 1.225
@@ -106,7 +106,7 @@ class Drag:
             return False
         innovation = predicted - measured
         record.innovation[axis], record.variance[axis] = innovation, variance
-        record.test_ratio = gate_ratio(innovation, variance, GATE)
+        record.test_ratio = test_ratio(innovation, variance, GATE)
         record.time_us = f.t_now
         record.judged += 1
         if record.test_ratio > 1.0:

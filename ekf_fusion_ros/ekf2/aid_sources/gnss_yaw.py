@@ -10,10 +10,10 @@ from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.filter import GnssFix
 from ekf_fusion_ros.ekf2.resets import Resets
 from ekf_fusion_ros.ekf2.scalar import fuse_scalar
-from ekf_fusion_ros.ekf2.scalar import gate_ratio
 from ekf_fusion_ros.ekf2.state import SECOND
 from ekf_fusion_ros.kernels.antenna_yaw import antenna_gradient
 from ekf_fusion_ros.kernels.innovation import project
+from ekf_fusion_ros.kernels.update import test_ratio
 from ekf_fusion_ros.mathlib.angles import wrap_pi
 
 INTERMITTENT_US = SECOND
@@ -140,7 +140,7 @@ class GnssYaw:
         gate = max(f.params.mag.heading_gate, 1.0)
         record = f.observations.yaw
         record.record(f.t_now, (innovation,), (variance,),
-                      gate_ratio(innovation, variance, gate))
+                      test_ratio(innovation, variance, gate))
         f.observations.mag.test_ratio = 0.0
         f.rejections.yaw = record.test_ratio > 1.0
         if not f.rejections.yaw:

@@ -13,13 +13,13 @@ from ekf_fusion_ros.ekf2.aid_sources.optical_flow_motion import FlowMotion
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.gnss_checks import GnssChecks
 from ekf_fusion_ros.ekf2.resets import Resets
-from ekf_fusion_ros.ekf2.scalar import gate_ratio
 from ekf_fusion_ros.ekf2.state import FILTER_PERIOD_US
 from ekf_fusion_ros.ekf2.state import PD
 from ekf_fusion_ros.ekf2.state import SECOND
 from ekf_fusion_ros.ekf2.terrain import Terrain
 from ekf_fusion_ros.kernels.innovation import project
 from ekf_fusion_ros.kernels.optical_flow import flow_jacobians
+from ekf_fusion_ros.kernels.update import test_ratio
 from ekf_fusion_ros.mathlib.rotation import cross
 from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
 from ekf_fusion_ros.samples import FlowSample
@@ -237,7 +237,7 @@ class OpticalFlow:
     ) -> bool:
         f = self._f
         record, rejections = f.observations.flow, f.rejections
-        ratios = [gate_ratio(i, s, gate) for i, s in zip(innovation, variance, strict=True)]
+        ratios = [test_ratio(i, s, gate) for i, s in zip(innovation, variance, strict=True)]
         record.record(f.t_now, innovation, variance, max(ratios))
         rejections.flow_x, rejections.flow_y = (ratio > 1.0 for ratio in ratios)
         rejections.flow_judged_after_hagl = True
