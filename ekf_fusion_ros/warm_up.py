@@ -16,12 +16,15 @@ import numpy as np
 from ekf_fusion_ros.inputs import make_estimator
 from ekf_fusion_ros.inputs import make_odometry_imu
 from ekf_fusion_ros.kernels.compile import COMPILED
+from ekf_fusion_ros.samples import AirspeedSample
 from ekf_fusion_ros.samples import BaroSample
+from ekf_fusion_ros.samples import FlowSample
 from ekf_fusion_ros.samples import GnssSample
 from ekf_fusion_ros.samples import HeadingSample
 from ekf_fusion_ros.samples import ImuSample
 from ekf_fusion_ros.samples import LandedSample
 from ekf_fusion_ros.samples import MagSample
+from ekf_fusion_ros.samples import RangeSample
 from ekf_fusion_ros.samples import Sample
 from ekf_fusion_ros.samples import VisionSample
 
@@ -33,6 +36,10 @@ STEPS = 1800
 STEADY_S = 6.0
 CLIMB = 3.0
 ACCELERATION = 1.5
+SEEN_HEIGHT = 10.0
+ANTENNAS_S = 9.0
+"""Time in s of the run-up after which antennas give yaw, so that the compass has had its turn."""
+
 METRES_PER_DEGREE = 111_195.0
 UP = np.array([0.0, 0.0, -1.0])
 NORTH = np.array([1.0, 0.0, 0.0])
@@ -70,18 +77,22 @@ def climb() -> Iterator[Sample]:
         time_us = number * STEP_US
         run_up = max(0.0, time_us * 1e-6 - STEADY_S)
         if time_us == round(1e6 * STEADY_S):
-            yield LandedSample(time_us, landed=False)
+            yield LandedSample(time_us, landed=False, fuse_beta=True)
         place = CLIMB * time_us * 1e-6 * UP + 0.5 * ACCELERATION * run_up ** 2 * NORTH
         velocity = CLIMB * UP + ACCELERATION * run_up * NORTH
         if number % 5 == 0:
             yield MagSample(time_us, FIELD)
             yield BaroSample(time_us, 100.0 - place[2])
+            seen = np.array((velocity[1], -velocity[0])) / SEEN_HEIGHT
+            yield RangeSample(time_us, SEEN_HEIGHT)
+            yield FlowSample(time_us, 0.05 * seen, np.zeros(3), 255, 0.05)
+            yield AirspeedSample(time_us, 1.0 + ACCELERATION * run_up, 1.0)
         if number % 4 == 0:
             yield VisionSample(time_us, place, LEVEL, velocity)
         if number % 20 == 0:
             yield GnssSample(
                 time_us, 47.0 + place[0] / METRES_PER_DEGREE, 8.0, 100.0 - place[2], 0.5, 0.8,
-                velocity, 0.2)
+                velocity, 0.2, yaw=0.0 if run_up > ANTENNAS_S else math.nan)
         if number % 600 == 0:
             yield HeadingSample(time_us, 0.0, math.radians(3.0) ** 2)
         dt = STEP_US * 1e-6
