@@ -128,7 +128,7 @@ def _add_odometry_as_imu(wanted: dict[str, dict[str, Any]]) -> None:
         'gyro_bias_process_noise': 1e-5,
     }
     wanted['vision']['velocity_tells_attitude'] = True
-    wanted['aiding'] = {'position_drift': 1.4, 'yaw_drift': 0.005, 'hold_yaw': False}
+    wanted['aiding'] = {'position_drift': 1.4, 'yaw_drift': 0.005, 'hold_yaw': 'never'}
     wanted['gnss']['correlation_time'] = 3.0
     wanted['gnss']['reset_at_start'] = False
 

@@ -11,6 +11,7 @@ Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
 
 MAG_TYPES = ('auto', 'heading', 'three_axis', 'vtol', 'indoor', 'none')
+YAW_HOLDING = ('always', 'unaided', 'never')
 HEIGHT_REFERENCES = ('baro', 'gnss', 'range', 'vision')
 
 
@@ -367,9 +368,10 @@ class AidingParams:
         min=0, max=10)
     yaw_drift: float = param(
         0.0, 'Random walk of yaw beside the gyro noise.', unit='rad/sqrt(s)', min=0, max=1)
-    hold_yaw: bool = param(
-        True, 'Bound the yaw variance by a pseudo measurement while nothing measures yaw. Off, '
-        'yaw is left to what position and velocity tell.')
+    hold_yaw: str = param(
+        'unaided', 'Bound the yaw variance by a pseudo measurement while nothing measures yaw: '
+        'always; while GNSS in flight does not tell it either (unaided); never.',
+        choices=YAW_HOLDING)
     airspeed_delay_ms: float = param(100.0, 'Delay of the airspeed sensor.', unit='ms', min=0,
                                      max=300, px4='EKF2_ASP_DELAY', ecl='airspeed_delay_ms')
     airspeed_threshold: float = param(2.0, 'Airspeed above which it is used; 0 = never.',

@@ -9,6 +9,7 @@ from ekf2.bench import Odometry
 import numpy as np
 import pytest
 
+from ekf_fusion_ros.params.ekf2 import YAW_HOLDING
 from ekf_fusion_ros.params.ekf2 import AidingParams
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 from ekf_fusion_ros.params.ekf2 import GnssCheckParams
@@ -34,7 +35,7 @@ def drawn_params(rng):
                             rotate=coin(), velocity_tells_attitude=coin()),
         mag=MagParams(type=str(rng.choice(['auto', 'heading', 'three_axis', 'none']))),
         height=HeightParams(reference=str(rng.choice(['baro', 'gnss', 'vision']))),
-        aiding=AidingParams(hold_yaw=coin()))
+        aiding=AidingParams(hold_yaw=str(rng.choice(YAW_HOLDING))))
 
 
 def disturb(bench, rng):

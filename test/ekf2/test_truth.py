@@ -10,6 +10,7 @@ import pytest
 
 from ekf_fusion_ros.ekf2.ekf2 import Ekf2
 from ekf_fusion_ros.geo.projection import LocalTangent
+from ekf_fusion_ros.params.ekf2 import AidingParams
 from ekf_fusion_ros.params.ekf2 import BaroParams
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 from ekf_fusion_ros.params.ekf2 import GnssParams
@@ -181,6 +182,22 @@ def test_biases_are_found():
     flown = fly(sensors).after(90.0)
     assert flown.horizontal().max() < 0.15
     assert np.degrees(np.abs(flown.yaw)).max() < 1.0
+
+
+@pytest.mark.slow
+def test_yaw_is_left_to_gnss_in_flight_without_a_compass():
+    """A pseudo measurement of yaw would claim what nothing has measured."""
+    def yaw_error(hold_yaw):
+        sensors = perfect_sensors()
+        del sensors['magnetic_field']
+        sensors['imu'] = Imu(gyro_bias=(0.005, -0.005, 0.01))
+        sensors['fix'] = replace(sensors['fix'], pos_noise=0.5, vel_noise=0.2)
+        params = Ekf2Params(mag=MagParams(type='none'), aiding=AidingParams(hold_yaw=hold_yaw))
+        return np.degrees(np.sqrt(np.mean(fly(sensors, params, seed=4).after(60.0).yaw ** 2)))
+
+    free = yaw_error('unaided')
+    assert free < 1.0
+    assert free < 0.6 * yaw_error('always')
 
 
 @pytest.mark.slow

@@ -122,7 +122,7 @@ class Magnetometer:
         no_other_yaw = not flags.ev_yaw and not flags.gps_yaw
         if f.params.mag.type == 'none' or flags.mag_fault or not flags.tilt_align:
             self.stop()
-            if no_other_yaw and (f.params.aiding.hold_yaw or not flags.yaw_align):
+            if no_other_yaw and self._yaw_needs_holding():
                 self._heading.hold(None, PSEUDO_YAW_NOISE)
             return
         other_yaw_ended = no_other_yaw and self._other_yaw_before
@@ -139,6 +139,13 @@ class Magnetometer:
             self._resets.position_to_aiding()
         if flags.yaw_align:
             self._fuse()
+
+    def _yaw_needs_holding(self) -> bool:
+        """True where only a pseudo measurement keeps yaw bounded, or the parameters ask for it."""
+        flags, when = self._f.flags, self._f.params.aiding.hold_yaw
+        motion_tells_yaw = flags.gps and flags.in_air
+        unaided = when == 'unaided' and not motion_tells_yaw
+        return when == 'always' or unaided or not flags.yaw_align
 
     def _strength_implausible(self) -> bool:
         strength = float(np.linalg.norm(self.field))
