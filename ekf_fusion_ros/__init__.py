@@ -21,12 +21,16 @@ if TYPE_CHECKING:
     from ekf_fusion_ros.params.files import load_file
     from ekf_fusion_ros.params.tree import Params
     from ekf_fusion_ros.params.tree import with_overrides
+    from ekf_fusion_ros.samples import AirspeedSample
+    from ekf_fusion_ros.samples import AuxVelocitySample
     from ekf_fusion_ros.samples import BaroSample
+    from ekf_fusion_ros.samples import FlowSample
     from ekf_fusion_ros.samples import GnssSample
     from ekf_fusion_ros.samples import HeadingSample
     from ekf_fusion_ros.samples import ImuSample
     from ekf_fusion_ros.samples import LandedSample
     from ekf_fusion_ros.samples import MagSample
+    from ekf_fusion_ros.samples import RangeSample
     from ekf_fusion_ros.samples import VelocityFrame
     from ekf_fusion_ros.samples import VisionSample
     from ekf_fusion_ros.session import FusionSession
@@ -40,12 +44,16 @@ _HOMES = {
     'params.files': ('load_file',),
     'params.tree': ('Params', 'with_overrides'),
     'samples': (
+        'AirspeedSample',
+        'AuxVelocitySample',
         'BaroSample',
+        'FlowSample',
         'GnssSample',
         'HeadingSample',
         'ImuSample',
         'LandedSample',
         'MagSample',
+        'RangeSample',
         'VelocityFrame',
         'VisionSample',
     ),
@@ -55,11 +63,14 @@ _MODULE_OF = {name: module for module, names in _HOMES.items() for name in names
 
 __all__ = [
     'AidStatus',
+    'AirspeedSample',
+    'AuxVelocitySample',
     'BaroSample',
     'Ekf2',
     'Ekf2Params',
     'Estimator',
     'Event',
+    'FlowSample',
     'FusionSession',
     'GeoPoint',
     'GnssSample',
@@ -70,6 +81,7 @@ __all__ = [
     'MagSample',
     'NavState',
     'Params',
+    'RangeSample',
     'VelocityFrame',
     'VisionSample',
     'load_file',
