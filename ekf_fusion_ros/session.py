@@ -42,6 +42,8 @@ from ekf_fusion_ros.samples import ImuSample
 from ekf_fusion_ros.samples import LandedSample
 from ekf_fusion_ros.samples import Sample
 from ekf_fusion_ros.samples import VisionSample
+from ekf_fusion_ros.sensor_rates import SensorRates
+from ekf_fusion_ros.sensor_rates import minimum_rates
 from ekf_fusion_ros.stamp_order import AidingOrder
 from ekf_fusion_ros.stamp_order import InertialOrder
 from ekf_fusion_ros.stamp_order import Step
@@ -108,6 +110,7 @@ class FusionSession:
         lead_us = round(SECOND_US * session.stamp_lead_max)
         self._aiding_order = {
             role: AidingOrder(lead_us, age_limit_us(self.params, role)) for role in roles}
+        self._rates = SensorRates(minimum_rates(self.params.ekf2, frozenset(roles)))
         self._heading = OdometryHeading()
         self._holding = Holding(round(1000 * session.hold_ms))
         self._completion = Completion(self.params.messages)
@@ -219,7 +222,10 @@ class FusionSession:
     def _accept(self, role: str, sample: Any) -> list[FusedOutput]:
         if role not in PARTS_OF_FIX:
             self._statistics[role].accepted += 1
+        self._rates.note(role, sample.time_us)
         if role == self._inertial_role:
+            for slow in self._rates.step(sample.time_us):
+                self._tell(sample.time_us, slow)
             return self._run(role, sample)
         if role == LANDED:
             self._landed = sample
@@ -402,9 +408,10 @@ class FusionSession:
     def health(self) -> Health:
         """Say in one sentence what the session is doing or waiting for."""
         health = self._estimator.health()
-        waiting = self._waiting_for()
-        return replace(health, text=waiting, level=max(health.level, HealthLevel.WARN)) \
-            if waiting else health
+        text, slow = self._waiting_for() or health.text, self._rates.slow()
+        fine = text == health.text and not slow
+        return Health(health.level if fine else max(health.level, HealthLevel.WARN),
+                      '; '.join([text, *slow]), {**health.values, **self._rates.values()})
 
     def _waiting_for(self) -> str:
         if self.roles is None:

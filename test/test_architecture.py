@@ -23,8 +23,8 @@ LAYERS = (
     ('messages',),
     (
         'session', 'completion', 'fix_assembly', 'fused_output', 'holding', 'inputs',
-        'odometry_heading', 'pairing', 'roles', 'sample_check', 'stamp_order', 'statistics',
-        'warm_up',
+        'odometry_heading', 'pairing', 'roles', 'sample_check', 'sensor_rates', 'stamp_order',
+        'statistics', 'warm_up',
     ),
     ('analysis',),
     ('node', 'replay'),

@@ -21,9 +21,9 @@ from ekf_fusion_ros.ekf2.state import STATES
 
 @pytest.fixture
 def bench():
-    """A level vehicle after 12 s, with fixes."""
+    """A level vehicle after 12 s, with fixes and range."""
     bench = Bench()
-    bench.sending.add('fix')
+    bench.sending |= {'fix', 'range'}
     bench.run(12.0)
     return bench
 
@@ -100,11 +100,9 @@ def test_states_and_variances_by_the_index_map(bench):
 
 
 def test_height_above_ground(bench):
-    bench.sending.add('range')
     bench.distance = 4.0
-    bench.run(2.0)
     bench.fly()
-    bench.run(12.0)
+    bench.run(5.0)
     told = values(bench)
     assert told['height_above_ground_valid'] == 'true'
     assert float(told['height_above_ground']) == pytest.approx(4.0, abs=0.1)
