@@ -12,6 +12,7 @@ import math
 from typing import TYPE_CHECKING
 from typing import Any
 
+from ekf_fusion_ros.airspeed_conditions import check_airspeed
 from ekf_fusion_ros.completion import Completion
 from ekf_fusion_ros.estimator import Estimator
 from ekf_fusion_ros.estimator import Event
@@ -29,6 +30,7 @@ from ekf_fusion_ros.inputs import make_estimator
 from ekf_fusion_ros.inputs import make_motion_heading
 from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.odometry_heading import OdometryHeading
+from ekf_fusion_ros.roles import AIRSPEED
 from ekf_fusion_ros.roles import FIX
 from ekf_fusion_ros.roles import IMU
 from ekf_fusion_ros.roles import LANDED
@@ -145,6 +147,7 @@ class FusionSession:
             return []
         try:
             self._judge_order(role, decoded.time_us)
+            self._judge_worth(role, decoded)
         except Refused as refusal:
             self._count_refusal(role, refusal.reason, refusal.detail)
             return []
@@ -163,6 +166,7 @@ class FusionSession:
             check_sample(sample)
             if self.roles is not None:
                 self._judge_role(role, sample.time_us)
+                self._judge_worth(role, sample)
             elif isinstance(sample, ImuSample):
                 check_advance(sample.time_us, self._now_us)
         except Refused as refusal:
@@ -218,6 +222,10 @@ class FusionSession:
                        'starts again')
             self._restart()
             self._inertial_order.judge(time_us)
+
+    def _judge_worth(self, role: str, reading: Any) -> None:
+        if role == AIRSPEED:
+            check_airspeed(reading, self.params.ekf2.aiding)
 
     def _accept(self, role: str, sample: Any) -> list[FusedOutput]:
         if role not in PARTS_OF_FIX:
