@@ -12,6 +12,7 @@ import math
 from typing import TYPE_CHECKING
 from typing import Any
 
+from ekf_fusion_ros.airspeed_conditions import check_airspeed
 from ekf_fusion_ros.completion import Completion
 from ekf_fusion_ros.estimator import Estimator
 from ekf_fusion_ros.estimator import Event
@@ -29,6 +30,7 @@ from ekf_fusion_ros.inputs import make_estimator
 from ekf_fusion_ros.inputs import make_motion_heading
 from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.odometry_heading import OdometryHeading
+from ekf_fusion_ros.roles import AIRSPEED
 from ekf_fusion_ros.roles import FIX
 from ekf_fusion_ros.roles import IMU
 from ekf_fusion_ros.roles import LANDED
@@ -42,6 +44,8 @@ from ekf_fusion_ros.samples import ImuSample
 from ekf_fusion_ros.samples import LandedSample
 from ekf_fusion_ros.samples import Sample
 from ekf_fusion_ros.samples import VisionSample
+from ekf_fusion_ros.sensor_rates import SensorRates
+from ekf_fusion_ros.sensor_rates import minimum_rates
 from ekf_fusion_ros.stamp_order import AidingOrder
 from ekf_fusion_ros.stamp_order import InertialOrder
 from ekf_fusion_ros.stamp_order import Step
@@ -108,6 +112,7 @@ class FusionSession:
         lead_us = round(SECOND_US * session.stamp_lead_max)
         self._aiding_order = {
             role: AidingOrder(lead_us, age_limit_us(self.params, role)) for role in roles}
+        self._rates = SensorRates(minimum_rates(self.params.ekf2, frozenset(roles)))
         self._heading = OdometryHeading()
         self._holding = Holding(round(1000 * session.hold_ms))
         self._completion = Completion(self.params.messages)
@@ -142,6 +147,7 @@ class FusionSession:
             return []
         try:
             self._judge_order(role, decoded.time_us)
+            self._judge_worth(role, decoded)
         except Refused as refusal:
             self._count_refusal(role, refusal.reason, refusal.detail)
             return []
@@ -160,6 +166,7 @@ class FusionSession:
             check_sample(sample)
             if self.roles is not None:
                 self._judge_role(role, sample.time_us)
+                self._judge_worth(role, sample)
             elif isinstance(sample, ImuSample):
                 check_advance(sample.time_us, self._now_us)
         except Refused as refusal:
@@ -216,10 +223,17 @@ class FusionSession:
             self._restart()
             self._inertial_order.judge(time_us)
 
+    def _judge_worth(self, role: str, reading: Any) -> None:
+        if role == AIRSPEED:
+            check_airspeed(reading, self.params.ekf2.aiding)
+
     def _accept(self, role: str, sample: Any) -> list[FusedOutput]:
         if role not in PARTS_OF_FIX:
             self._statistics[role].accepted += 1
+        self._rates.note(role, sample.time_us)
         if role == self._inertial_role:
+            for slow in self._rates.step(sample.time_us):
+                self._tell(sample.time_us, slow)
             return self._run(role, sample)
         if role == LANDED:
             self._landed = sample
@@ -402,9 +416,10 @@ class FusionSession:
     def health(self) -> Health:
         """Say in one sentence what the session is doing or waiting for."""
         health = self._estimator.health()
-        waiting = self._waiting_for()
-        return replace(health, text=waiting, level=max(health.level, HealthLevel.WARN)) \
-            if waiting else health
+        text, slow = self._waiting_for() or health.text, self._rates.slow()
+        fine = text == health.text and not slow
+        return Health(health.level if fine else max(health.level, HealthLevel.WARN),
+                      '; '.join([text, *slow]), {**health.values, **self._rates.values()})
 
     def _waiting_for(self) -> str:
         if self.roles is None:

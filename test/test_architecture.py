@@ -22,9 +22,9 @@ LAYERS = (
     ('ekf2', 'lpe', 'health', 'odometry_imu', 'motion_heading'),
     ('messages',),
     (
-        'session', 'completion', 'fix_assembly', 'fused_output', 'holding', 'inputs',
-        'odometry_heading', 'pairing', 'roles', 'sample_check', 'stamp_order', 'statistics',
-        'warm_up',
+        'session', 'airspeed_conditions', 'completion', 'fix_assembly', 'fused_output',
+        'holding', 'inputs', 'odometry_heading', 'pairing', 'roles', 'sample_check',
+        'sensor_rates', 'stamp_order', 'statistics', 'warm_up',
     ),
     ('analysis',),
     ('node', 'replay'),

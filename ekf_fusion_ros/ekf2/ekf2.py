@@ -171,6 +171,17 @@ class Ekf2:
         """Return the state predicted to the newest IMU sample, None before initialisation."""
         return nav_state(self) if self.initialised else None
 
+    def states(self) -> Array:
+        """Return the states (24,) at the fusion horizon; `ekf2.state.STATES` is their index map.
+
+        Units: rad and m/s per filter period for the biases, G for fields, else SI; NED and FRD.
+        """
+        return self.filter.x.copy()
+
+    def variances(self) -> Array:
+        """Return the variances (24,) of `states`, in the squares of their units."""
+        return np.diag(self.filter.cov.p).copy()
+
     def aid_statuses(self) -> Sequence[AidStatus]:
         """Return one record per kind of observation that was ever tried."""
         return [o.status() for o in self.filter.observations.all() if o.judged or o.starts]

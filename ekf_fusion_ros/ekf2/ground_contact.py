@@ -1,4 +1,7 @@
-"""On the ground or in the air: told by a landed sample, inferred from motion until one comes."""
+"""On the ground or in the air: told by a landed sample, inferred from motion until one comes.
+
+Of a rover motion alone decides.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ from ekf_fusion_ros.samples import LandedSample
 
 FLIGHT_SPEED = 1.0
 FLIGHT_HEIGHT = 1.0
+ROLLING_SPEED = 0.2
 SIGNIFICANT = 3.0
 """A speed counts from this many of its sigmas on."""
 
@@ -25,31 +29,46 @@ class GroundContact:
         self._f = f
         self._told = False
         self._rest_down = 0.0
+        vehicle = f.params.aiding.vehicle
+        self._is_rover = vehicle == 'rover'
+        self._on_wings = self._zero_sideslip = f.flags.fixed_wing = vehicle == 'fixed_wing'
 
     def tell(self, sample: LandedSample) -> None:
         """Take a landed sample; it acts at once."""
-        f = self._f
+        if self._is_rover:
+            return
         self._told = True
-        f.flags.fixed_wing = sample.fixed_wing
-        f.flags.fuse_beta = sample.fuse_beta and not sample.landed
+        self._f.flags.fixed_wing = sample.fixed_wing or self._on_wings
+        self._zero_sideslip = sample.fuse_beta or self._on_wings
         self._set(not sample.landed)
 
     def step(self, quiet: bool) -> None:
         """Infer from motion; once per filter period. quiet: no vibration or rotation lately."""
         f = self._f
-        if self._told or not f.params.aiding.infer_in_air or not f.flags.tilt_align:
+        if self._told or not f.flags.tilt_align:
             return
-        if quiet:
+        if self._is_rover:
+            self._set(self._rolls() or (not quiet and (f.flags.in_air or self._travels())))
+        elif not f.params.aiding.infer_in_air:
+            return
+        elif quiet:
             self._rest_down = float(f.x[9])
             self._set(False)
-        elif f.flags.in_air or self._moves():
+        elif f.flags.in_air or self._climbs() or self._travels():
             self._set(True)
 
-    def _moves(self) -> bool:
+    def _climbs(self) -> bool:
+        return abs(float(self._f.x[9]) - self._rest_down) > FLIGHT_HEIGHT
+
+    def _rolls(self) -> bool:
+        """Return whether the estimate moves; at an even speed no sensor of inertia tells."""
         f = self._f
-        if abs(float(f.x[9]) - self._rest_down) > FLIGHT_HEIGHT:
-            return True
-        fix = f.fix
+        sigma = math.sqrt(f.cov.p[4, 4] + f.cov.p[5, 5])
+        return math.hypot(f.x[4], f.x[5]) > max(ROLLING_SPEED, SIGNIFICANT * sigma)
+
+    def _travels(self) -> bool:
+        """Return whether the latest fix moves."""
+        fix = self._f.fix
         if fix is None or not fix.has_velocity:
             return False
         speed = math.hypot(float(fix.velocity[0]), float(fix.velocity[1]))
@@ -58,6 +77,7 @@ class GroundContact:
     def _set(self, in_air: bool) -> None:
         f = self._f
         f.flags.in_air = in_air
+        f.flags.fuse_beta = in_air and self._zero_sideslip
         if in_air:
             f.last_in_air_us = f.t_now
         else:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ekf_fusion_ros.ekf2.covariance import quat_by_rotation_vector
+from ekf_fusion_ros.ekf2.operator_view import operator_values
 from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import HealthLevel
 from ekf_fusion_ros.estimator import NavState
@@ -80,7 +80,7 @@ def nav_state(ekf: Ekf2) -> NavState:
 def health(ekf: Ekf2) -> Health:
     """Return the first thing that is not as it should be, or what is being fused."""
     level, text = _state(ekf)
-    return Health(level, text, _values(ekf))
+    return Health(level, text, operator_values(ekf))
 
 
 def _state(ekf: Ekf2) -> tuple[HealthLevel, str]:
@@ -118,25 +118,3 @@ def _sources(ekf: Ekf2) -> str:
         (flags.baro_hgt, 'barometric height'), (flags.gps_hgt, 'GNSS height'),
         (flags.rng_hgt, 'range height'), (flags.ev_hgt, 'odometry height'))
     return 'fusing ' + (', '.join(word for on, word in words if on) or 'nothing')
-
-
-def _values(ekf: Ekf2) -> dict[str, str]:
-    f = ekf.filter
-    p = f.cov.p
-    quat_jacobian = quat_by_rotation_vector(f.x[0:4])
-    tilt = np.linalg.pinv(quat_jacobian) @ p[0:4, 0:4] @ np.linalg.pinv(quat_jacobian).T
-    vibration = ekf.inertial.vibration
-    return {
-        'horizontal_position_sigma': f'{math.sqrt(max(p[7, 7] + p[8, 8], 0.0)):.3f}',
-        'height_sigma': f'{math.sqrt(max(p[9, 9], 0.0)):.3f}',
-        'velocity_sigma': f'{math.sqrt(max(float(np.trace(p[4:7, 4:7])), 0.0)):.3f}',
-        'attitude_sigma_deg': f'{math.degrees(math.sqrt(max(float(np.trace(tilt)), 0.0))):.2f}',
-        'resets': str(ekf.control.resets.counters.total()),
-        'horizon_delay': f'{1e-6 * (f.t_now - f.t_horizon):.3f}',
-        'vibration_coning': f'{vibration[0]:.3g}',
-        'vibration_angle': f'{vibration[1]:.3g}',
-        'vibration_velocity': f'{vibration[2]:.3g}',
-        'output_attitude_error': f'{f.output.tracking_error[0]:.4f}',
-        'output_velocity_error': f'{f.output.tracking_error[1]:.4f}',
-        'output_position_error': f'{f.output.tracking_error[2]:.4f}',
-    }

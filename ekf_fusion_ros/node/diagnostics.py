@@ -12,6 +12,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_msgs.msg import KeyValue
 from rclpy.node import Node
 
+from ekf_fusion_ros.airspeed_conditions import BELOW_THRESHOLD
 from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import HealthLevel
 from ekf_fusion_ros.statistics import RoleStatistics
@@ -22,6 +23,8 @@ TROUBLE = {
 }
 # Roles that need not speak while nothing changes.
 TOLD_ON_CHANGE = ('landed',)
+# Why messages are refused while all is well: a vehicle that is slow or parked.
+EXPECTED_REASONS = (BELOW_THRESHOLD,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +66,10 @@ class TopicWatch:
     def report(self, counts: RoleStatistics) -> Report:
         """Report the counts and what changed."""
         new = counts.received - self._received
-        new_refused = counts.refused_total - self._refused
-        self._received, self._refused = counts.received, counts.refused_total
+        refused = sum(
+            count for why, count in counts.refused.items() if why not in EXPECTED_REASONS)
+        new_refused = refused - self._refused
+        self._received, self._refused = counts.received, refused
         reasons = sorted(counts.refused.items())
         values = {
             'topic': self._topic, 'received': str(counts.received),

@@ -13,6 +13,7 @@ ZERO: Vector = (0.0, 0.0, 0.0)
 MAG_TYPES = ('auto', 'heading', 'three_axis', 'vtol', 'indoor', 'none')
 YAW_HOLDING = ('always', 'unaided', 'never')
 HEIGHT_REFERENCES = ('baro', 'gnss', 'range', 'vision')
+VEHICLES = ('unspecified', 'multirotor', 'fixed_wing', 'rover')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -357,6 +358,10 @@ class AidingParams:
                                    ecl='pos_noaid_noise')
     valid_timeout: float = param(5.0, 'Dead reckoning after which the output is not valid.',
                                  unit='s', min=0.5, max=600, px4='EKF2_NOAID_TOUT')
+    vehicle: str = param(
+        'unspecified', 'Kind of vehicle. On fixed wings sideslip in flight is taken to be zero on '
+        'average; a rover is never on the ground while it moves, whatever a landed sample says; '
+        'airspeed of a multirotor is not used.', choices=VEHICLES)
     infer_in_air: bool = param(
         True, 'Take a moving vehicle to be in the air, one at rest to be on the ground, until a '
         'landed sample says which.')
@@ -377,6 +382,8 @@ class AidingParams:
     airspeed_threshold: float = param(2.0, 'Airspeed above which it is used; 0 = never.',
                                       unit='m/s', min=0, max=50, px4='EKF2_ARSP_THR',
                                       ecl='arsp_thr')
+    airspeed_conditions: bool = param(
+        True, 'Keep airspeed from the filter that is below the threshold or of a multirotor.')
     auxvel_delay_ms: float = param(5.0, 'Delay of the auxiliary velocity.', unit='ms', min=0,
                                    max=300, px4='EKF2_AVEL_DELAY', ecl='auxvel_delay_ms')
     wind_process_noise: float = param(0.1, 'Wind random walk.', unit='m/s^2', min=0, max=1.0,

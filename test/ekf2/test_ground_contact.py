@@ -85,6 +85,52 @@ def test_the_profile_does_not_guess():
     assert 'in_air' not in bench.flags
 
 
+def bench_of(vehicle):
+    """A level vehicle of a kind after 12 s, with fixes."""
+    bench = Bench(Ekf2Params(aiding=AidingParams(vehicle=vehicle)))
+    bench.sending.add('fix')
+    bench.run(12.0)
+    return bench
+
+
+def test_fixed_wings_need_no_landed_sample_to_be_known():
+    bench = bench_of('fixed_wing')
+    assert 'fixed_wing' in bench.flags and 'fuse_beta' not in bench.flags
+    bench.fix.velocity = np.array((0.0, 2.0, 0.0))
+    for _ in range(10):
+        shake(bench)
+        bench.run(0.1)
+    assert {'in_air', 'fuse_beta', 'wind'} <= bench.flags
+
+
+def test_sideslip_of_fixed_wings_only_counts_in_flight():
+    bench = bench_of('fixed_wing')
+    bench.ekf.push(LandedSample(bench.now_us, landed=False))
+    assert {'in_air', 'fixed_wing', 'fuse_beta'} <= bench.flags
+    bench.ekf.push(LandedSample(bench.now_us, landed=True))
+    assert 'fixed_wing' in bench.flags and not {'in_air', 'fuse_beta'} & bench.flags
+
+
+@pytest.mark.parametrize('vehicle', ['unspecified', 'multirotor', 'rover'])
+def test_other_vehicles_may_slip(vehicle):
+    bench = bench_of(vehicle)
+    bench.fly()
+    assert not {'fixed_wing', 'fuse_beta'} & bench.flags
+
+
+@pytest.mark.parametrize('landed', [True, False])
+def test_a_rover_is_on_the_ground_while_it_rests_whatever_is_said(landed):
+    bench = bench_of('rover')
+    bench.ekf.push(LandedSample(bench.now_us, landed=landed))
+    bench.run(1.0)
+    assert 'in_air' not in bench.flags
+    bench.travel(1.0, 10.0)
+    # an even speed: nothing shakes any more
+    assert 'in_air' in bench.flags and bench.ekf.inertial.quiet
+    bench.travel(0.0, 10.0)
+    assert 'in_air' not in bench.flags
+
+
 def velocity_error_after_a_lying_accelerometer(adapt):
     """Speed that the filter believes 3 s after its IMU began to claim 4 m/s^2 in vain."""
     params = Ekf2Params()

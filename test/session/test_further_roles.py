@@ -71,6 +71,36 @@ def test_airspeed_takes_the_density_of_the_pressure(build, estimator, fly):
     assert after.true_airspeed == pytest.approx(20.0 * math.sqrt(1.2250 / 1.11166), rel=1e-5)
 
 
+@pytest.mark.parametrize(('overrides', 'refused'), [
+    ({}, {'below_threshold': 3}),
+    ({'ekf2__aiding__airspeed_threshold': 9.5}, {'below_threshold': 4}),
+    ({'ekf2__aiding__airspeed_threshold': 0.0}, {'switched_off': 5}),
+    ({'ekf2__aiding__vehicle': 'multirotor'}, {'rotary_wing': 5}),
+    ({'ekf2__aiding__vehicle': 'fixed_wing'}, {'below_threshold': 3}),
+    ({'ekf2__aiding__airspeed_conditions': False}, {}),
+])
+def test_airspeed_that_tells_nothing_is_refused_by_reason(
+        build, estimator, fly, overrides, refused):
+    session, run = fly('fix', 'airspeed', **overrides)
+    run(0.0, 1.0)
+    for step, speed in enumerate((0.0, 1.0, 2.0, 9.0, 10.0)):
+        session.handle('airspeed', build.airspeed(START + 1.0 + 0.1 * step, speed=speed))
+        run(1.01 + 0.1 * step, 1.1 + 0.1 * step)
+    session.finish()
+    counts = session.statistics()['airspeed']
+    assert counts.refused == refused
+    assert counts.accepted == len(estimator.of(AirspeedSample)) == 5 - sum(refused.values())
+
+
+def test_airspeed_samples_meet_the_same_conditions(estimator):
+    session = FusionSession(Params(), ('imu', 'airspeed'), estimator=estimator)
+    for step, speed in enumerate((1.9, 2.1)):
+        session.push(AirspeedSample(microseconds(step), speed, 1.0))
+    session.finish()
+    assert [sample.true_airspeed for sample in estimator.of(AirspeedSample)] == [2.1]
+    assert session.statistics()['airspeed'].refused == {'below_threshold': 1}
+
+
 def test_landed_acts_at_the_inertial_time_of_its_arrival(build, estimator, fly):
     session, run = fly('landed')
     run(0.0, 1.0)
