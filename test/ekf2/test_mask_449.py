@@ -28,8 +28,6 @@ from ekf_fusion_ros.simulation.scenario import Scenario
 from ekf_fusion_ros.simulation.trajectory import Flight
 from ekf_fusion_ros.simulation.vision import Vision
 
-pytestmark = pytest.mark.slow
-
 FLIGHT = Flight(duration=115.0, size=40.0, period=40.0, height=15.0, landing=15.0)
 NO_YAW, NO_VISION, NO_FIX = (32.0, 45.0), (55.0, 67.0), (77.0, 92.0)
 """When each source is silent, s; it has ten seconds and more to settle before the next."""
