@@ -60,7 +60,7 @@ def test_yaw_is_that_of_the_vehicle_whatever_the_antennas(yaw, offset):
     assert wrap_pi(heading(bench) - math.radians(yaw)) == pytest.approx(0.0, abs=0.01)
 
 
-def test_a_small_step_is_followed_slowly_and_a_larger_one_is_clipped_on_the_ground():
+def test_a_step_is_followed_slowly():
     bench = turned(0.3)
     bench.run(16.0)
     resets = bench.resets.quat
@@ -69,6 +69,23 @@ def test_a_small_step_is_followed_slowly_and_a_larger_one_is_clipped_on_the_grou
     assert 0.3 < heading(bench) < bench.fix.yaw
     bench.run(25.0)
     assert heading(bench) == pytest.approx(bench.fix.yaw, abs=0.01)
+    assert bench.resets.quat == resets
+
+
+def test_a_step_beyond_the_gate_is_clipped_on_the_ground():
+    """Interference is likelier than a turn: each fix may pull by the gate and no more."""
+    bench = turned(0.3)
+    bench.run(16.0)
+    resets, step = bench.resets.quat, math.radians(120.0)
+    bench.fix.yaw = wrap_pi(0.3 + step)
+    bench.run(1.0)
+    (status,) = [s for s in bench.ekf.aid_statuses() if s.name == 'yaw']
+    assert status.test_ratio > 1.0
+    assert not status.innovation_rejected
+    limit = 2.6 * math.sqrt(status.innovation_variance[0])
+    assert abs(status.innovation[0]) == pytest.approx(limit)
+    assert limit < step
+    assert 'gps_yaw' in bench.flags
     assert bench.resets.quat == resets
 
 

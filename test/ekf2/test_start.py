@@ -163,6 +163,19 @@ def test_an_origin_may_be_given_without_fixes(bench):
     assert bench.ekf.nav_state().origin == origin
 
 
+def test_an_origin_without_fixes_moves_with_its_setting(bench):
+    """The vehicle stays where it is on the earth, so that its position moves the other way."""
+    assert bench.ekf.set_origin(GeoPoint(-30.0, 170.0, 100.0))
+    before = bench.ekf.nav_state().position
+    assert bench.ekf.set_origin(GeoPoint(-30.001, 170.0, 120.0))
+    bench.run(2.0)
+    moved = bench.ekf.nav_state().position - before
+    # A thousandth of a degree of latitude is 110.9 m at 30 S.
+    np.testing.assert_allclose(moved, (110.9, 0.0, 20.0), atol=0.3)
+    assert bench.resets.pos_ne == bench.resets.pos_d == 1
+    assert max(s.test_ratio for s in bench.ekf.aid_statuses() if s.active) < 0.1
+
+
 def test_reset_forgets_everything(bench):
     bench.ekf.reset()
     assert not bench.ekf.initialised

@@ -145,6 +145,29 @@ def test_covariance_turns_with_the_body_but_not_with_the_local_frame(frame, unce
     assert bench.p[uncertain] == pytest.approx(1.0, rel=0.1)
 
 
+def test_covariance_of_a_local_velocity_turns_with_a_rotated_frame():
+    """The vehicle looks north; the frame of the odometry has its first axis west."""
+    bench = aligned(vision_only(use_velocity=True, rotate=True))
+    bench.odometry.quaternion = yaw_quaternion(QUARTER)
+    bench.odometry.velocity_cov = np.diag((2.0, 0.01, 0.01))
+    first_sample(bench, 'vel_ne')
+    np.testing.assert_allclose(bench.ekf.filter.rot_ev, matrix_from_euler_321(0.0, 0.0, -QUARTER),
+                               atol=1e-2)
+    assert bench.p[5] / bench.p[4] == pytest.approx(200.0, rel=0.15)
+
+
+def test_position_velocity_and_yaw_together():
+    bench = aligned(vision_only(use_position=True, use_velocity=True, use_yaw=True))
+    before = bench.flags
+    bench.odometry.quaternion = yaw_quaternion(-0.4)
+    bench.odometry.position = np.array((4.0, -2.0, 0.0))
+    bench.sending.add('vision')
+    bench.run(1.0)
+    assert bench.flags == before - {'mag_hdg'} | {'ev_pos', 'ev_vel', 'ev_yaw'}
+    np.testing.assert_allclose(bench.x[4:9], (0.0, 0.0, 0.0, 4.0, -2.0), atol=0.02)
+    assert bench.attitude[2] == pytest.approx(-0.4, abs=0.01)
+
+
 def test_a_body_velocity_goes_where_the_vehicle_looks():
     bench = aligned(vision_only(use_velocity=True), yaw=QUARTER)
     bench.odometry.velocity = np.array((2.0, 0.5, 0.0))
@@ -153,8 +176,10 @@ def test_a_body_velocity_goes_where_the_vehicle_looks():
     np.testing.assert_allclose(bench.x[4:7], (-0.5, 2.0, 0.0), atol=0.05)
 
 
-def test_a_moved_position_is_followed_in_the_frame_of_the_odometry():
-    bench = aligned(vision_only(use_position=True, use_yaw=True), yaw=0.6)
+@pytest.mark.parametrize('rotate', [False, True])
+def test_a_moved_position_is_followed_in_the_frame_of_the_odometry(rotate):
+    """With its yaw in use the frame of the odometry is the earth frame: nothing to rotate."""
+    bench = aligned(vision_only(use_position=True, use_yaw=True, rotate=rotate), yaw=0.6)
     bench.odometry.position_var = np.full(3, 0.01)
     bench.sending.add('vision')
     bench.run(4.0)

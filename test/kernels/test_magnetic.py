@@ -20,6 +20,7 @@ from ekf_fusion_ros.kernels.magnetic import field_jacobian
 from ekf_fusion_ros.kernels.magnetic import fuse_field
 from ekf_fusion_ros.kernels.magnetic import fuse_field_axis
 from ekf_fusion_ros.kernels.magnetic import limit_field
+from ekf_fusion_ros.kernels.magnetic import low_pass
 from ekf_fusion_ros.kernels.magnetic import predict_field
 
 NOISE = 0.05 ** 2
@@ -113,3 +114,28 @@ def test_limits_of_the_earth_field(north, east, length, angle):
     limit_field(x, 0.1, 0.1)
     np.testing.assert_allclose(x[16:18], (length * math.cos(angle), length * math.sin(angle)))
     assert np.count_nonzero(x == 7.0) == 22
+
+
+@pytest.mark.parametrize(('steps', 'reached'), [(9, 0.63), (27, 0.95), (45, 0.99)])
+def test_low_pass_rises_as_a_first_order_lag(steps, reached):
+    """A share of a tenth is a time constant of nine and a half steps: 1, 3 and 5 of them."""
+    value, target = np.zeros(3), np.array((1.0, -2.0, 0.5))
+    distance = []
+    for _ in range(steps):
+        low_pass(value, target, 0.1)
+        distance.append(np.abs(target - value))
+    np.testing.assert_allclose(value / target, reached, atol=0.02)
+    assert (np.diff(distance, axis=0) < 0.0).all()
+
+
+@pytest.mark.parametrize(('share', 'expected'), [(0.0, 0.3), (1.0, -4.0)])
+def test_low_pass_at_its_ends_holds_or_passes_through(share, expected):
+    value = np.full(3, 0.3)
+    low_pass(value, np.full(3, -4.0), share)
+    np.testing.assert_array_equal(value, expected)
+
+
+def test_low_pass_of_zero_stays_zero():
+    value = np.zeros(3)
+    low_pass(value, np.zeros(3), 0.1)
+    np.testing.assert_array_equal(value, 0.0)

@@ -137,7 +137,8 @@ def test_another_yaw_keeps_the_tilt(q, yaw):
 
 
 @pytest.mark.parametrize(('roll', 'pitch', 'sequence'), [
-    (0.6, 0.1, yaw_321), (0.1, 0.6, yaw_312), (1.5, 0.2, yaw_321), (0.2, 1.5, yaw_312)])
+    (0.6, 0.1, yaw_321), (0.1, 0.6, yaw_312), (1.5, 0.2, yaw_321), (0.2, 1.5, yaw_312),
+    (0.5 * math.pi, 0.0, yaw_321), (0.0, 0.5 * math.pi, yaw_312)])
 def test_yaw_is_read_far_from_the_singularity(roll, pitch, sequence):
     rot = Rotation.from_euler('ZYX', (0.4, pitch, roll)).as_matrix()
     assert yaw_of(rot) == sequence(rot)
