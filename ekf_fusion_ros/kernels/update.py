@@ -45,14 +45,14 @@ def _subtract_by_element(p: Array, gain: Array, hp: Array) -> bool:
 def _subtract_as_arrays(p: Array, gain: Array, hp: Array) -> bool:
     if (p.ravel()[::25] < gain * hp).any():
         return False
-    half = np.multiply.outer(0.5 * gain, hp)
-    p -= half + half.T
+    rest = p - np.multiply.outer(gain, hp)
+    p[:, :] = 0.5 * (rest + rest.T)
     return True
 
 
 subtract = _subtract_by_element if COMPILED else _subtract_as_arrays
-"""P <- P - K H P with the halves averaged, for gain (24,) and H P (24,), where P is symmetric;
-False, and nothing done, where a variance would turn negative."""
+"""P <- P - K H P with the halves averaged, for gain (24,) and H P (24,); False, and nothing done,
+where a variance would turn negative."""
 
 
 @kernel
