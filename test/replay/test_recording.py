@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+from ekf_fusion_ros.params.ekf2 import AidingParams
 from ekf_fusion_ros.params.messages import GpsHeadingMessageParams
 from ekf_fusion_ros.params.messages import MessageParams
 from ekf_fusion_ros.samples import VelocityFrame
@@ -140,7 +141,10 @@ def test_replay_takes_in_all_further_roles(further, tmp_path):
               for name, topic in topics.items()}
     assert counts['/range'] == ('range', 1201, 1201, {})
     assert counts['/flow'] == ('flow', 800, 800, {})
-    assert counts['/airspeed'] == ('airspeed', 801, 801, {})
+    slow = sum(sent.true_airspeed / sent.eas2tas <= AidingParams().airspeed_threshold
+               for sent, _ in pairs(further, 'airspeed', '/airspeed'))
+    assert 0 < slow < 40
+    assert counts['/airspeed'] == ('airspeed', 801, 801 - slow, {'below_threshold': slow})
     assert counts['/gps_heading'] == ('gps_heading', 176, 176, {})
     assert counts['/landed'] == ('landed', 201, 151, {'withheld': 50})
 
