@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ekf_fusion_ros.ekf2.aid_sources.barometer import Barometer
 from ekf_fusion_ros.ekf2.aid_sources.gnss import VERTICAL_NOISE_RATIO
 from ekf_fusion_ros.ekf2.aid_sources.magnetometer import Magnetometer
-from ekf_fusion_ros.ekf2.filter import DelayedImu
+from ekf_fusion_ros.ekf2.delayed_imu import DelayedImu
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.height import Height
 from ekf_fusion_ros.ekf2.state import FILTER_PERIOD

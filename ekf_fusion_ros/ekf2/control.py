@@ -9,7 +9,6 @@ from ekf_fusion_ros.ekf2.aid_sources.auxiliary_velocity import AuxiliaryVelocity
 from ekf_fusion_ros.ekf2.aid_sources.barometer import Barometer
 from ekf_fusion_ros.ekf2.aid_sources.drag import Drag
 from ekf_fusion_ros.ekf2.aid_sources.fake_position import FakePosition
-from ekf_fusion_ros.ekf2.aid_sources.gnss import INTERMITTENT_US
 from ekf_fusion_ros.ekf2.aid_sources.gnss import Gnss
 from ekf_fusion_ros.ekf2.aid_sources.magnetometer import Magnetometer
 from ekf_fusion_ros.ekf2.aid_sources.optical_flow import OpticalFlow
@@ -70,45 +69,51 @@ class Control:
         self._active_before: tuple[bool, ...] = ()
 
     def step(self) -> None:
-        """Run every source once, then terrain and the yaw bank."""
+        """Run every source once, then terrain."""
         f = self._f
-        f.gps_hgt_before, f.rng_hgt_before = f.flags.gps_hgt, f.flags.rng_hgt
-        if not f.flags.tilt_align:
+        flags = f.flags
+        f.gps_hgt_before, f.rng_hgt_before = flags.gps_hgt, flags.rng_hgt
+        if not flags.tilt_align:
             self._check_tilt()
-        yaw_was_aligned = f.flags.yaw_align
-        self._check_arrivals()
-        gnss_popped = self.gnss.pop()
-        mag_popped = self.mag.pop()
-        self.baro.pop()
-        self.range.pop()
-        self.flow.pop()
-        vision_popped = self.vision.pop()
-        self.airspeed.pop()
-
+        yaw_was_aligned = flags.yaw_align
+        self._take_samples()
         self.height.check_health()
-        self.mag.step(mag_popped, self.checks)
+        self.mag.step(self.checks)
         self.flow.step()
-        self.gnss.step(gnss_popped)
-        self.wind.step()
-        self.airspeed.step()
-        self.sideslip.step()
-        self.drag.step(self.mag.inhibit_reset_request)
-        self.height.step(gnss_popped, vision_popped)
-        self.vision.step(vision_popped, self.checks, self.gnss.vision_yaw_forbidden)
+        self.gnss.step()
+        if flags.wind or flags.fuse_aspd or flags.fuse_beta or f.airspeed_popped \
+                or self.drag.enabled:
+            self._step_air_data()
+        self.height.step()
+        self.vision.step(self.checks, self.gnss.vision_yaw_forbidden)
         self.aux_velocity.step()
         self.fake_position.step(self.checks)
         self.validity.step()
         if self.heading.covariance_lost or f.covariance_lost:
             self.heading.covariance_lost = f.covariance_lost = False
             initialise_covariance(f)
-        if f.flags.yaw_align and not yaw_was_aligned:
+        if flags.yaw_align and not yaw_was_aligned:
             f.events.add(f.t_now, EventKind.YAW_ALIGNED)
-        self.terrain.predict()
-        self.terrain.fuse_range(self.range)
-        self.flow.aid_terrain()
-        self.terrain.keep_below()
-        self._step_bank(gnss_popped)
+        self.terrain.step(self.range, self.flow)
         self._note_activity()
+
+    def _take_samples(self) -> None:
+        """Take what the horizon has passed, after judging whether sensors still deliver."""
+        self.gnss.check_arrival()
+        self.baro.check_arrival()
+        self.gnss.pop()
+        self.mag.pop()
+        self.baro.pop()
+        self.range.pop()
+        self.flow.pop()
+        self.vision.pop()
+        self.airspeed.pop()
+
+    def _step_air_data(self) -> None:
+        self.wind.step()
+        self.airspeed.step()
+        self.sideslip.step()
+        self.drag.step(self.mag.inhibit_reset_request)
 
     def move_origin(self, origin: GeoPoint) -> bool:
         """Move the origin of the local frame; False where the point is unusable.
@@ -134,27 +139,20 @@ class Control:
             f.flags.tilt_align = True
             f.events.add(f.t_now, EventKind.TILT_ALIGNED)
 
-    def _check_arrivals(self) -> None:
-        """Judge whether sensors still deliver, before the horizon takes their samples."""
-        fixes = self.gnss.buffer
-        has_height = fixes.newest is not None and math.isfinite(fixes.newest.altitude)
-        self.gnss.height_intermittent = not (
-            has_height and self._f.recent(fixes.newest_time_us, INTERMITTENT_US))
-        self.baro.check_arrival()
-
-    def _step_bank(self, gnss_popped: bool) -> None:
-        f = self._f
-        self.bank.step(f.imu.increments, f.flags.in_air, self._bank_airspeed(), f.x, f.dt_avg)
-        fix = f.fix
-        if gnss_popped and fix is not None and fix.has_velocity and fix.vacc > 0.0:
-            self.bank.set_velocity(fix.velocity, fix.vacc)
-
-    def _bank_airspeed(self) -> float:
+    def bank_airspeed(self) -> float:
         """Return the last airspeed in m/s, what a fixed wing usually has where that is old."""
         f = self._f
         if f.flags.fixed_wing and f.late(f.airspeed_us, AIRSPEED_RECENT_US):
             return f.params.yaw_estimator.default_airspeed
         return 0.0 if f.airspeed is None else f.airspeed.true_airspeed
+
+    def correct_bank(self) -> None:
+        """Let the yaw bank use its velocity, and offer it that of a new fix for the next period."""
+        f = self._f
+        self.bank.correct(f.imu.increments, f.flags.in_air, f.x, f.dt_avg)
+        fix = f.fix
+        if self.gnss.popped and fix is not None and fix.has_velocity and fix.vacc > 0.0:
+            self.bank.set_velocity(fix.velocity, fix.vacc)
 
     def _note_activity(self) -> None:
         """Count starts and stops of each observation."""

@@ -8,16 +8,17 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ekf_fusion_ros.ekf2.delayed_imu import DelayedImu
 from ekf_fusion_ros.ekf2.state import FILTER_PERIOD
 from ekf_fusion_ros.ekf2.state import SIZE
 from ekf_fusion_ros.kernels.compile import kernel
 from ekf_fusion_ros.kernels.heading import apply_yaw
 from ekf_fusion_ros.kernels.magnetic import fuse_declination
 from ekf_fusion_ros.kernels.magnetic import fuse_field
+from ekf_fusion_ros.kernels.period import predict
 from ekf_fusion_ros.kernels.prediction import GRAVITY
 from ekf_fusion_ros.kernels.prediction import PROCESS
 from ekf_fusion_ros.kernels.prediction import add_yaw_variance
-from ekf_fusion_ros.kernels.prediction import advance_covariance
 from ekf_fusion_ros.kernels.update import ACCEL_BIAS_VARIANCE_MAX
 from ekf_fusion_ros.kernels.update import MAG_ACTIVE
 from ekf_fusion_ros.kernels.update import WIND_ACTIVE
@@ -44,7 +45,6 @@ class Covariance:
         self.p: Array = np.zeros((SIZE, SIZE))
         self.limits: Array = np.zeros(6)
         self.inhibited: Array = self.limits[0:3]
-        self.inhibited_axes = NO_AXES
         self._saved_ne = np.zeros((2, 2))
         self._saved_d_body = np.zeros(4)
         self._mag_active = False
@@ -55,7 +55,12 @@ class Covariance:
         self._bad_axes = NO_AXES
         self._process = np.zeros(1, PROCESS)
         process = self._process[0]
-        self._saved: Array = process['saved']
+        self.accel_lpf: Array = process['accel_lpf']
+        self.travel: Array = process['travel']
+        self._learns_no_accel_bias = imu.inhibit_accel_bias
+        process['accel_bias_limit'] = imu.accel_bias_limit
+        process['peak_limits'] = imu.accel_bias_learn_gyro_limit, imu.accel_bias_learn_accel_limit
+        process['peak_decay'] = 1.0 - dt / imu.accel_bias_learn_time
         self._velocity_var: Array = process['velocity_var']
         self._velocity_var[:] = self._accel_var
         process['angle_var'] = (dt * min(imu.gyro_noise, 1.0)) ** 2
@@ -69,18 +74,24 @@ class Covariance:
         process['yaw_drift_var'] = dt * params.aiding.yaw_drift ** 2
 
     def predict(
-        self, x: Array, imu: Array, dt_avg: float, bad_accel: bool,
-        clipping: tuple[bool, bool, bool],
-    ) -> None:
-        """Propagate P over one filter period of nominal length.
+        self, x: Array, rot: Array, imu: DelayedImu, earth_rate: Array, dt_avg: float,
+        in_air: bool, bad_accel: bool,
+    ) -> tuple[float, float, bool]:
+        """Propagate state and P over one filter period; see kernels.period.predict.
 
-        x (24,) the predicted state; imu (8,) raw increments; dt_avg mean filter period in s.
+        x (24,), rot (3, 3) the rotation of x, earth_rate (3,) rad/s NED, dt_avg s; bad_accel: the
+        accelerometer contradicts the height aiding.
         """
+        clipping = imu.clipping
         bad_axes = ALL_AXES if bad_accel else clipping
         if bad_axes != self._bad_axes:
             self._bad_axes = bad_axes
             self._set_velocity_noise()
-        advance_covariance(self.p, x, imu, self.limits, self._process, dt_avg)
+        clipped = 0 if clipping == NO_AXES else sum(c << k for k, c in enumerate(clipping))
+        outcome: tuple[float, float, bool] = predict(
+            x, self.p, rot, imu.increments, earth_rate, self.limits, self._process, dt_avg,
+            in_air, bad_accel or self._learns_no_accel_bias, clipped)
+        return outcome
 
     def _set_velocity_noise(self) -> None:
         self._velocity_var[:] = np.where(self._bad_axes, BAD_ACCEL_VARIANCE, self._accel_var)
@@ -109,20 +120,6 @@ class Covariance:
     @wind_active.setter
     def wind_active(self, active: bool) -> None:
         self.limits[WIND_ACTIVE] = active
-
-    def inhibit_accel_bias(self, axes: tuple[bool, bool, bool]) -> None:
-        """Freeze the estimation of some accelerometer biases, keeping their variance."""
-        if axes == self.inhibited_axes:
-            return
-        self.inhibited_axes = axes
-        for axis, inhibit in enumerate(axes):
-            state = 13 + axis
-            if inhibit and self.inhibited[axis] == 0.0:
-                self._saved[axis] = self.p[state, state]
-                self.inhibited[axis] = 1.0
-            elif not inhibit and self.inhibited[axis] != 0.0:
-                self.p[state, state] = self._saved[axis]
-                self.inhibited[axis] = 0.0
 
     def fuse_state(
         self, x: Array, state: int, innovation: float, noise: float, gate: float,

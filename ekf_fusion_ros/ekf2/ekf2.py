@@ -10,13 +10,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ekf_fusion_ros.ekf2.accel_bias_check import AccelBiasCheck
 from ekf_fusion_ros.ekf2.alignment import Alignment
 from ekf_fusion_ros.ekf2.control import Control
+from ekf_fusion_ros.ekf2.delayed_imu import NO_CLIPPING
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.ground_contact import GroundContact
 from ekf_fusion_ros.ekf2.inertial_input import InertialInput
 from ekf_fusion_ros.ekf2.inertial_input import buffer_lengths
-from ekf_fusion_ros.ekf2.learning import AccelBiasLearning
 from ekf_fusion_ros.ekf2.report import health
 from ekf_fusion_ros.ekf2.report import nav_state
 from ekf_fusion_ros.estimator import AidStatus
@@ -24,7 +25,6 @@ from ekf_fusion_ros.estimator import Event
 from ekf_fusion_ros.estimator import GeoPoint
 from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import NavState
-from ekf_fusion_ros.kernels.prediction import advance_state
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 from ekf_fusion_ros.params.spec import validate
 from ekf_fusion_ros.samples import AirspeedSample
@@ -67,16 +67,18 @@ class Ekf2:
                                       self.params.imu.moving_scaler)
         self._alignment = Alignment(self.filter, self.control.mag, self.control.baro,
                                     self.control.height, self._observation_length)
-        self._learning = AccelBiasLearning(self.filter)
+        self._accel_bias_check = AccelBiasCheck(self.filter)
         self._ground_contact = GroundContact(self.filter)
         self._raw: ImuSample | None = None
-        self._period_complete = False
         self.initialised = False
 
     def push(self, sample: Sample) -> None:
         """Queue a measurement; those before the first ImuSample have no effect."""
         if isinstance(sample, ImuSample):
-            self._push_imu(sample)
+            if self._raw is not None:
+                self.update()
+            self._raw = sample
+            self.inertial.started = True
         elif not self.inertial.started:
             return
         elif isinstance(sample, MagSample):
@@ -105,43 +107,22 @@ class Ekf2:
         raw, self._raw = self._raw, None
         if raw is None:
             return False
-        if not self.initialised and not self._initialise():
-            return False
-        complete = self._period_complete
-        if complete:
-            self._predict()
-            self._ground_contact.step(self.inertial.quiet)
-            self.control.step()
         f = self.filter
-        f.output.propagate(raw, f.x, f.dt_imu_avg, f.dt_avg)
+        complete = self.inertial.add(raw, f.flags.in_air, f.output, f.x, f.dt_avg)
+        f.t_now = raw.time_us
+        f.dt_imu_avg = self.inertial.dt_avg
+        f.flags.vehicle_at_rest = self.inertial.at_rest
         if complete:
-            delay = 1e-6 * (f.t_now - f.t_horizon)
-            f.output.correct(f.x, delay, f.dt_imu_avg, f.dt_avg)
+            f.t_horizon = self.inertial.ring[0].time_us
+            self.control.drag.add(raw)
+        if not self.initialised:
+            return self._start(raw, complete)
+        if complete:
+            self._advance(raw)
         return complete
 
-    def _push_imu(self, sample: ImuSample) -> None:
-        if self._raw is not None:
-            self.update()
-        f = self.filter
-        self._raw = sample
-        self._period_complete = self.inertial.add(sample, f.flags.in_air)
-        if self._period_complete:
-            f.t_horizon = self.inertial.ring[0].time_us
-            self.control.drag.add(sample)
-        f.flags.vehicle_at_rest = self.inertial.at_rest
-        f.t_now = sample.time_us
-        f.dt_imu_avg = self.inertial.dt_avg
-
-    def _push_fix(self, sample: GnssSample) -> None:
-        interval = self.inertial.min_interval_us
-        altitude_before = self.filter.earth.alt_ref
-        origin_set = self.control.gnss.push(sample, interval, self.initialised)
-        if origin_set:
-            self.control.height.refer_to(self.filter.earth.alt_ref - altitude_before)
-        if origin_set and self.params.height.reference == 'gnss':
-            self.control.height.start_gnss()
-
-    def _initialise(self) -> bool:
+    def _start(self, raw: ImuSample, complete: bool) -> bool:
+        """Align with what there is; True when that has begun with a complete filter period."""
         ring = self.inertial.ring
         if not ring or not self._alignment.attempt(ring[-1]):
             return False
@@ -151,21 +132,42 @@ class Ekf2:
         times.hgt = times.hor_pos = times.hor_vel = times.flow = f.t_now
         f.output.align(f.x)
         self.initialised = True
-        return True
+        if complete:
+            self._advance(raw)
+        else:
+            f.output.propagate(raw, f.x, f.dt_imu_avg, f.dt_avg)
+        return complete
+
+    def _advance(self, raw: ImuSample) -> None:
+        """Step the filter by the period that a raw sample has completed."""
+        f = self.filter
+        self._predict()
+        self._ground_contact.step(self.inertial.quiet)
+        control = self.control
+        control.step()
+        delay = 1e-6 * (f.t_now - f.t_horizon)
+        f.output.finish_period(raw, f, delay, control.bank, control.bank_airspeed())
+        control.correct_bank()
 
     def _predict(self) -> None:
         """Carry states and covariance over the filter period at the horizon."""
         f = self.filter
         f.imu = self.inertial.ring[0]
-        increments = f.imu.increments
-        learning = self._learning
-        f.dt_avg, peak_rate, peak_force, observable, down_bias = advance_state(
-            f.x, f.rot, increments, f.earth.rate_ned, f.accel_lpf, f.dt_avg,
-            self.params.imu.accel_bias_limit, learning.peaks, learning.decay)
-        learning.step(peak_rate, peak_force, observable)
-        f.cov.wind_active = f.flags.wind
-        f.cov.predict(f.x, increments, f.dt_avg, f.faults.accel_vertical, f.imu.clipping)
-        learning.check_consistency(down_bias)
+        f.dt_avg, down_bias, learned = f.cov.predict(
+            f.x, f.rot, f.imu, f.earth.rate_ned, f.dt_avg, f.flags.in_air,
+            f.faults.accel_vertical)
+        f.faults.accel_clipping = f.imu.clipping != NO_CLIPPING
+        if learned:
+            self._accel_bias_check.step(down_bias)
+
+    def _push_fix(self, sample: GnssSample) -> None:
+        interval = self.inertial.min_interval_us
+        altitude_before = self.filter.earth.alt_ref
+        origin_set = self.control.gnss.push(sample, interval, self.initialised)
+        if origin_set:
+            self.control.height.refer_to(self.filter.earth.alt_ref - altitude_before)
+        if origin_set and self.params.height.reference == 'gnss':
+            self.control.height.start_gnss()
 
     def nav_state(self) -> NavState | None:
         """Return the state predicted to the newest IMU sample, None before initialisation."""

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.covariance import Covariance
+from ekf_fusion_ros.ekf2.delayed_imu import NO_CLIPPING
+from ekf_fusion_ros.ekf2.delayed_imu import DelayedImu
 from ekf_fusion_ros.ekf2.earth import EarthReference
 from ekf_fusion_ros.ekf2.events import EventLog
 from ekf_fusion_ros.ekf2.flags import ControlFlags
@@ -29,17 +31,6 @@ Array = NDArray[np.float64]
 
 MIN_PERIOD = 2.5e-3
 """Interval in s below which an increment says nothing about a rate."""
-
-NO_CLIPPING = (False, False, False)
-
-
-class DelayedImu(NamedTuple):
-    """One filter period of inertial data: delta angle (3), delta velocity (3), both intervals."""
-
-    time_us: int
-    increments: Array
-    clipping: tuple[bool, bool, bool]
-
 
 class GnssFix(NamedTuple):
     """A fix in the local frame: NE position (2,) m, altitude m, NED velocity (3,) m/s."""
@@ -121,7 +112,8 @@ class Filter:
         self.t_horizon = 0
         self.dt_imu_avg = 0.0
         self.dt_avg = FILTER_PERIOD
-        self.accel_lpf = np.zeros(2)
+        self.accel_lpf = self.cov.accel_lpf
+        self.travel = self.cov.travel
         self.flags = ControlFlags()
         self.gps_hgt_before = False
         self.rng_hgt_before = False

@@ -8,8 +8,8 @@ from ekf_fusion_ros.ekf2.aid_sources.barometer import Barometer
 from ekf_fusion_ros.ekf2.aid_sources.gnss import VERTICAL_NOISE_RATIO
 from ekf_fusion_ros.ekf2.aid_sources.gnss import Gnss
 from ekf_fusion_ros.ekf2.aid_sources.vision import Vision
+from ekf_fusion_ros.ekf2.delayed_imu import NO_CLIPPING
 from ekf_fusion_ros.ekf2.events import EventKind
-from ekf_fusion_ros.ekf2.filter import NO_CLIPPING
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.fusion import fuse_vertical_position
 from ekf_fusion_ros.ekf2.gnss_checks import GnssChecks
@@ -248,17 +248,17 @@ class Height:
 
     # ---- selection ----
 
-    def step(self, gnss_popped: bool, vision_popped: bool) -> None:
+    def step(self) -> None:
         """Select the source and fuse its sample; once per filter period."""
         reference = self._f.params.height.reference
         if reference == 'gnss':
-            self._prefer_gnss(gnss_popped)
+            self._prefer_gnss()
         elif reference == 'vision':
-            self._prefer_vision(vision_popped)
+            self._prefer_vision()
         elif reference == 'range':
             self._prefer_range()
         else:
-            self._prefer_baro(gnss_popped)
+            self._prefer_baro()
         if not self._f.flags.baro_hgt and self._baro.popped:
             self._baro.follow()
         if self._f.flags.rng_hgt and self._ranging.substitute_on_ground():
@@ -275,7 +275,7 @@ class Height:
         else:
             self._fall_back_to_baro()
 
-    def _prefer_baro(self, gnss_popped: bool) -> None:
+    def _prefer_baro(self) -> None:
         f = self._f
         near_ground = self._ranging.aids()
         if near_ground and self._ranging.finder.fresh:
@@ -284,11 +284,11 @@ class Height:
         elif not near_ground and self._baro.popped and not self._baro.faulty:
             self.start_baro()
             self._baro.fuse()
-        elif f.flags.gps_hgt and gnss_popped and not self._gnss.height_intermittent:
+        elif f.flags.gps_hgt and self._gnss.popped and not self._gnss.height_intermittent:
             self._tie_gnss()
             self._fuse_gnss()
 
-    def _prefer_gnss(self, gnss_popped: bool) -> None:
+    def _prefer_gnss(self) -> None:
         f = self._f
         may_start = (f.fix is not None and math.isfinite(f.fix.altitude)
                      and f.earth.has_origin and not self._gnss.height_intermittent
@@ -303,20 +303,20 @@ class Height:
                 self.start_baro()
         elif not f.flags.gps_hgt and not near_ground and may_start:
             self.start_gnss()
-        if f.flags.gps_hgt and gnss_popped:
+        if f.flags.gps_hgt and self._gnss.popped:
             self._fuse_gnss()
         elif f.flags.rng_hgt and self._ranging.finder.fresh:
             self._ranging.fuse(self.offset)
         else:
             self._fall_back_to_baro()
 
-    def _prefer_vision(self, vision_popped: bool) -> None:
+    def _prefer_vision(self) -> None:
         f = self._f
         if not f.flags.ev_hgt and f.recent(self._vision.last_arrival_us, VISION_RECENT_US):
             self.start_vision()
             if not f.rng_hgt_before:
                 self.reset()
-        if f.flags.ev_hgt and vision_popped:
+        if f.flags.ev_hgt and self._vision.popped:
             self._fuse_vision()
         elif f.flags.rng_hgt and self._ranging.finder.fresh:
             self._ranging.fuse(self.offset)

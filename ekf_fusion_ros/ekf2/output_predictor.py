@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.kernels.output import OUTPUT
-from ekf_fusion_ros.kernels.output import correct_predictor
 from ekf_fusion_ros.kernels.output import propagate_predictor
+from ekf_fusion_ros.kernels.period import finish_period
 from ekf_fusion_ros.mathlib.rotation import cross
 from ekf_fusion_ros.mathlib.rotation import quat_multiply
 from ekf_fusion_ros.params.ekf2 import OutputParams
 from ekf_fusion_ros.samples import ImuSample
+
+if TYPE_CHECKING:
+    from ekf_fusion_ros.ekf2.filter import Filter
+    from ekf_fusion_ros.ekf2.yaw_estimator import YawEstimator
 
 Array = NDArray[np.float64]
 
@@ -25,9 +31,9 @@ class OutputPredictor:
 
     def __init__(self, params: OutputParams, history: int) -> None:
         """Keep as many periods of history as the fusion horizon is delayed."""
-        self._params = params
-        self._output = np.zeros(1, OUTPUT)
-        output = self._output[0]
+        self._vel_tau, self._pos_tau = params.vel_tau, params.pos_tau
+        self.state = np.zeros(1, OUTPUT)
+        output = self.state[0]
         self.now: Array = output['now']
         self.now[0] = 1.0
         self.rot: Array = output['rot']
@@ -42,21 +48,30 @@ class OutputPredictor:
         """Start from the filter state (24,)."""
         self._history[:] = x[0:10]
         self.now[:] = x[0:10]
+        self.state['running'] = True
 
     def propagate(self, imu: ImuSample, x: Array, dt_imu_avg: float, dt_avg: float) -> None:
-        """Advance by one raw IMU sample."""
-        propagate_predictor(self._output, imu.delta_angle, imu.delta_velocity,
-                            imu.delta_angle_dt, imu.delta_velocity_dt, x, dt_imu_avg / dt_avg)
+        """Advance by one raw IMU sample that completes no filter period."""
+        propagate_predictor(self.state, imu.delta_angle, imu.delta_velocity, imu.delta_angle_dt,
+                            imu.delta_velocity_dt, x, dt_imu_avg / dt_avg)
 
-    def correct(self, x: Array, delay: float, dt_imu_avg: float, dt_avg: float) -> None:
-        """Compare with the filter state (24,) that lies `delay` s in the past."""
+    def finish_period(
+        self, imu: ImuSample, f: Filter, delay: float, bank: YawEstimator, airspeed: float,
+    ) -> None:
+        """Advance by the raw sample that completes a period, and compare with the filter.
+
+        The state of the filter lies `delay` s in the past. The yaw bank advances by the period at
+        the horizon; airspeed m/s, 0 = unknown.
+        """
         pushed, size = self._pushed, self._size
         self._pushed += 1
         oldest = (pushed + 1) % size if pushed + 1 >= size else 0
-        correct_predictor(self._output, self._history, pushed % size, oldest, x,
-                          0.5 * dt_imu_avg / max(delay, dt_imu_avg),
-                          dt_avg / max(self._params.vel_tau, dt_avg),
-                          dt_avg / max(self._params.pos_tau, dt_avg))
+        dt_imu_avg, dt_avg = f.dt_imu_avg, f.dt_avg
+        finish_period(
+            self.state, self._history, pushed % size, oldest, f.x, imu.delta_angle,
+            imu.delta_velocity, imu.delta_angle_dt, imu.delta_velocity_dt, dt_imu_avg / dt_avg,
+            0.5 * dt_imu_avg / max(delay, dt_imu_avg), dt_avg / max(self._vel_tau, dt_avg),
+            dt_avg / max(self._pos_tau, dt_avg), bank.models, f.imu.increments, airspeed)
 
     def velocity_at_origin(self, imu_position: Array) -> Array:
         """Return the velocity (3,) of the body origin, given the IMU position (3,) in the body."""

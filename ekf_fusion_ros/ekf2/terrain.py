@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from ekf_fusion_ros.ekf2.aid_sources.range_finder import RangeFinder
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.scalar import passes
@@ -10,6 +12,9 @@ from ekf_fusion_ros.ekf2.state import SECOND
 from ekf_fusion_ros.ekf2.state import VE
 from ekf_fusion_ros.ekf2.state import VN
 from ekf_fusion_ros.kernels.update import test_ratio
+
+if TYPE_CHECKING:
+    from ekf_fusion_ros.ekf2.aid_sources.optical_flow import OpticalFlow
 
 VARIANCE_MAX = 1e4
 VALID_US = 5 * SECOND
@@ -26,6 +31,10 @@ class Terrain:
         self.variance = 0.0
         self._last_on_ground_down = 0.0
         self._initialised = False
+        terrain = f.params.terrain
+        self._clearance = terrain.ground_clearance
+        self._drift_var = terrain.process_noise ** 2
+        self._slope_var = terrain.gradient ** 2
 
     def initialise(self) -> None:
         """Take the ground to be just below the vehicle."""
@@ -42,31 +51,32 @@ class Terrain:
         self.down += shift
         self._last_on_ground_down += shift
 
-    def predict(self) -> None:
-        """Hold the ground below a vehicle that stands on it, else let it become uncertain.
+    def step(self, finder: RangeFinder, flow: OpticalFlow) -> None:
+        """Predict and fuse; once per filter period, after all other fusion."""
+        self._predict()
+        if finder.fresh:
+            self.fuse_range(finder)
+        flow.aid_terrain()
+        self.keep_below()
 
-        Once per filter period, after all fusion and before that of `fuse_range` and `fuse_flow`.
-        """
+    def _predict(self) -> None:
+        """Hold the ground below a vehicle that stands on it, else let it become uncertain."""
         f = self._f
-        down = f.x.item(PD)
         if not f.flags.in_air:
-            self._last_on_ground_down = down
-            clearance = f.params.terrain.ground_clearance
-            self.down = self._last_on_ground_down + clearance
-            self.variance = clearance ** 2
+            self._last_on_ground_down = f.x.item(PD)
+            self.down = self._last_on_ground_down + self._clearance
+            self.variance = self._clearance ** 2
             f.times.hagl = f.t_now
-        else:
-            dt = f.imu.increments.item(7)
-            params = f.params.terrain
-            speed_squared = f.x.item(VN) ** 2 + f.x.item(VE) ** 2
-            growth = ((dt * params.process_noise) ** 2
-                      + (dt * params.gradient) ** 2 * speed_squared)
-            self.variance = min(max(self.variance + growth, 0.0), VARIANCE_MAX)
+            return
+        north, east, dt = f.x.item(VN), f.x.item(VE), f.imu.increments.item(7)
+        growth = dt * dt * (self._drift_var + self._slope_var * (north * north + east * east))
+        self.variance = min(max(self.variance + growth, 0.0), VARIANCE_MAX)
 
     def keep_below(self) -> None:
         """Keep the ground below the vehicle."""
-        highest = self._f.x.item(PD) + self._f.params.terrain.ground_clearance
-        self.down = max(self.down, highest)
+        highest = self._f.x.item(PD) + self._clearance
+        if self.down < highest:
+            self.down = highest
 
     def fuse_range(self, finder: RangeFinder) -> None:
         """Fuse a fresh height above ground in flight; reset to it when refused for too long."""

@@ -33,8 +33,8 @@ class YawEstimator:
 
     def __init__(self) -> None:
         """Wait for a quiet moment to find the tilt."""
-        self._bank = np.zeros(1, BANK)
-        models = self._bank[0]
+        self.models = np.zeros(1, BANK)
+        models = self.models[0]
         self.rot: Array = models['rot']
         self.rot[:] = np.eye(3)
         self.bias: Array = models['bias']
@@ -42,11 +42,11 @@ class YawEstimator:
         self.cov: Array = models['cov']
         self.weights: Array = models['weights']
         self.weights[:] = 1.0 / MODELS
-        self.running = False
         self._composite: Array = models['composite']
         self._composite[1] = (0.5 * math.pi) ** 2
         self._accel: Array = models['accel']
         self._tilt_aligned = False
+        self._running = False
         self._velocity: Array | None = None
         self._accuracy = 0.0
 
@@ -56,23 +56,36 @@ class YawEstimator:
         self._accuracy = accuracy
 
     def step(self, imu: Array, airborne: bool, airspeed: float, x: Array, dt: float) -> None:
-        """Advance by one filter period.
+        """Advance by one filter period and correct; airspeed m/s, 0 = unknown."""
+        advance_bank(self.models, imu, airspeed)
+        self.correct(imu, airborne, x, dt)
 
-        imu (8,) raw increments; airspeed m/s, 0 = unknown; x (24,) the state of the main filter,
-        with whose gyro bias, per period of dt s, the references start.
+    def correct(self, imu: Array, airborne: bool, x: Array, dt: float) -> None:
+        """Find the tilt, or use the velocity that is offered; after each advance of the models.
+
+        imu (8,) raw increments; x (24,) the state of the main filter, with whose gyro bias, per
+        period of dt s, the references start.
         """
-        velocity, self._velocity = self._velocity, None
         if not self._tilt_aligned:
-            self._velocity = velocity
             self._align_tilt(imu)
             return
-        advance_bank(self._bank, imu, airspeed, self.running)
+        velocity, self._velocity = self._velocity, None
         if not airborne:
-            self.running = False
+            if self._running:
+                self._run(False)
         elif velocity is not None:
             self._use(velocity, x[10:13] / dt)
-            if self.running:
+            if self._running:
                 combine_models(self.state, self.cov, self.weights, self._composite)
+
+    @property
+    def running(self) -> bool:
+        """True while the filters of the models run."""
+        return self._running
+
+    def _run(self, running: bool) -> None:
+        self._running = running
+        self.models['running'] = running
 
     @property
     def yaw(self) -> float:
@@ -98,9 +111,10 @@ class YawEstimator:
         north /= np.linalg.norm(north)
         self.rot[:] = np.vstack((north, np.cross(down, north), down))
         self._tilt_aligned = True
+        self.models['tilt_aligned'] = True
 
     def _use(self, velocity: Array, gyro_bias: Array) -> None:
-        if not self.running:
+        if not self._running:
             self._start(velocity, gyro_bias)
             return
         density = np.zeros(MODELS)
@@ -110,7 +124,7 @@ class YawEstimator:
         floored = self.weights < WEIGHT_FLOOR
         if floored.all():
             self._reset_models(velocity)
-            self.running = False
+            self._run(False)
             return
         self.weights[floored] = WEIGHT_FLOOR
         self.weights /= self.weights.sum()
@@ -120,7 +134,7 @@ class YawEstimator:
         for m in range(MODELS):
             self.rot[m] = with_yaw(self.rot[m], wrap_pi(float(self.state[m, 2])))
         self.bias[:] = gyro_bias
-        self.running = True
+        self._run(True)
 
     def _reset_models(self, velocity: Array) -> None:
         spacing = 2.0 * math.pi / MODELS

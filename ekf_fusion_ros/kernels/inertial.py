@@ -7,12 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ekf_fusion_ros.kernels.compile import four
 from ekf_fusion_ros.kernels.compile import kernel
 from ekf_fusion_ros.kernels.compile import three
-from ekf_fusion_ros.mathlib.rotation import quat_from_rotation_vector
-from ekf_fusion_ros.mathlib.rotation import quat_multiply
-from ekf_fusion_ros.mathlib.rotation import quat_normalise
+from ekf_fusion_ros.mathlib.rotation import exponential
+from ekf_fusion_ros.mathlib.rotation import rotate
 from ekf_fusion_ros.mathlib.rotation import rotation_vector_from_quat
 
 Array = NDArray[np.float64]
@@ -23,8 +21,10 @@ ties of this sum, and agreement with the reference filter needs the same ties.""
 
 INERTIAL = np.dtype([
     ('quat', 'f8', (4,)), ('velocity', 'f8', (3,)), ('clock', 'f4', (2,)), ('sums', 'f8', (1,)),
-    ('previous', 'f8', (6,)), ('vibration', 'f8', (3,))])
-"""What down-sampling and vibration metrics keep between raw samples."""
+    ('period', 'f8', (8,)), ('previous', 'f8', (6,)), ('vibration', 'f8', (3,)),
+    ('limits', 'f8', (3,))])
+"""What down-sampling and vibration metrics keep between raw samples, the last complete period, and
+the limits of rest: angle vibration in rad, velocity vibration in m/s, rate in rad/s."""
 
 COMPLETE = 1
 MOVED = 2
@@ -46,10 +46,10 @@ def accumulate_imu(
     to act half way through its rotation, which removes the sculling error to first order
     (P. G. Savage, "Strapdown inertial navigation integration algorithm design", 1998).
     """
-    step = quat_from_rotation_vector(delta_angle)
-    quat[:] = quat_normalise(quat_multiply(quat, step))
+    a0, a1, a2 = three(delta_angle)
+    w, x, y, z = exponential(a0, a1, a2)
+    rotate(quat, w, x, y, z)
     # v' = R(step)^T v, by the vector part of the quaternion
-    w, x, y, z = four(step)
     x, y, z = -x, -y, -z
     for turn in range(2):
         if turn == 0:
@@ -89,23 +89,23 @@ def accumulate_imu(
 @kernel
 def take_imu(
     state: NDArray[np.void], delta_angle: Array, delta_velocity: Array, angle_dt: float,
-    velocity_dt: float, angle_limit: float, velocity_limit: float, turn_limit: float, out: Array,
+    velocity_dt: float, dt: float,
 ) -> int:
     """Run update_vibration and accumulate_imu on one raw sample; state is one INERTIAL.
 
-    Returns COMPLETE where out (8,) holds a filter period, plus MOVED where angle vibration,
-    velocity vibration or the angle of this sample exceed their limits in rad, m/s and rad.
+    Returns COMPLETE where the sample completed a filter period, plus MOVED where vibration or the
+    turn over dt in s exceed the limits of rest.
     """
     s = state[0]
-    metrics = s['vibration']
+    metrics, limits = s['vibration'], s['limits']
     update_vibration(delta_angle, delta_velocity, s['previous'], metrics)
     ax, ay, az = three(delta_angle)
     turned = math.sqrt(ax * ax + ay * ay + az * az)
     word = 0
-    if metrics[1] > angle_limit or metrics[2] > velocity_limit or turned > turn_limit:
+    if metrics[1] > limits[0] or metrics[2] > limits[1] or turned > limits[2] * dt:
         word += MOVED
     if accumulate_imu(delta_angle, delta_velocity, angle_dt, velocity_dt, s['quat'],
-                      s['velocity'], s['clock'], s['sums'], out):
+                      s['velocity'], s['clock'], s['sums'], s['period']):
         word += COMPLETE
     return word
 
@@ -129,5 +129,6 @@ def update_vibration(
     metrics[0] = 0.99 * metrics[0] + 0.01 * coning
     metrics[1] = 0.99 * metrics[1] + 0.01 * angle
     metrics[2] = 0.99 * metrics[2] + 0.01 * velocity
-    previous[0:3] = delta_angle
-    previous[3:6] = delta_velocity
+    for i in range(3):
+        previous[i] = delta_angle[i]
+        previous[3 + i] = delta_velocity[i]

@@ -12,20 +12,21 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ekf_fusion_ros.kernels.compile import four
 from ekf_fusion_ros.kernels.compile import kernel
 from ekf_fusion_ros.kernels.compile import three
 from ekf_fusion_ros.kernels.prediction import GRAVITY
-from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
-from ekf_fusion_ros.mathlib.rotation import quat_from_rotation_vector
-from ekf_fusion_ros.mathlib.rotation import quat_multiply
-from ekf_fusion_ros.mathlib.rotation import quat_normalise
+from ekf_fusion_ros.mathlib.rotation import exponential
+from ekf_fusion_ros.mathlib.rotation import fill_matrix
+from ekf_fusion_ros.mathlib.rotation import rotate
 
 Array = NDArray[np.float64]
 
 OUTPUT = np.dtype([
     ('now', 'f8', (10,)), ('rot', 'f8', (3, 3)), ('correction', 'f8', (3,)), ('yaw', 'f8', (2,)),
-    ('rate', 'f8', (3,)), ('integral', 'f8', (6,)), ('tracking_error', 'f8', (3,))])
-"""What the output predictor keeps beside its history."""
+    ('rate', 'f8', (3,)), ('integral', 'f8', (6,)), ('tracking_error', 'f8', (3,)),
+    ('running', 'f8')])
+"""What the output predictor keeps beside its history; it runs once it has been aligned."""
 
 
 @kernel
@@ -33,10 +34,11 @@ def propagate_predictor(
     state: NDArray[np.void], delta_angle: Array, delta_velocity: Array, angle_dt: float,
     velocity_dt: float, x: Array, bias_scale: float,
 ) -> None:
-    """Run propagate_output on one OUTPUT."""
+    """Run propagate_output on one OUTPUT, if it is running."""
     s = state[0]
-    propagate_output(s['now'], s['rot'], delta_angle, delta_velocity, angle_dt, velocity_dt, x,
-                     bias_scale, s['correction'], s['yaw'], s['rate'])
+    if s['running'] != 0.0:
+        propagate_output(s['now'], s['rot'], delta_angle, delta_velocity, angle_dt, velocity_dt, x,
+                         bias_scale, s['correction'], s['yaw'], s['rate'])
 
 
 @kernel
@@ -62,19 +64,26 @@ def propagate_output(
     yaw (2,) accumulates the turn about the vertical and low-passes its rate; rate (3,) receives
     the raw body rate.
     """
-    rate[:] = delta_angle / angle_dt
-    angle = delta_angle - x[10:13] * bias_scale + correction
-    a0, a1, a2 = three(angle)
+    d0, d1, d2 = three(delta_angle)
+    b0, b1, b2 = three(x[10:13])
+    c0, c1, c2 = three(correction)
+    rate[0], rate[1], rate[2] = d0 / angle_dt, d1 / angle_dt, d2 / angle_dt
+    a0 = d0 - b0 * bias_scale + c0
+    a1 = d1 - b1 * bias_scale + c1
+    a2 = d2 - b2 * bias_scale + c2
     z0, z1, z2 = three(rot[2])
     spin = a0 * z0 + a1 * z1 + a2 * z2
     yaw[0] += spin
     yaw[1] = 0.95 * yaw[1] + 0.05 * spin / angle_dt
-    out[0:4] = quat_normalise(quat_multiply(out[0:4], quat_from_rotation_vector(angle)))
-    rot[:, :] = matrix_from_quat(out[0:4])
-    dv0, dv1, dv2 = three(delta_velocity - x[13:16] * bias_scale)
+    q0, q1, q2, q3 = exponential(a0, a1, a2)
+    rotate(out, q0, q1, q2, q3)
+    fill_matrix(out, rot)
+    d0, d1, d2 = three(delta_velocity)
+    b0, b1, b2 = three(x[13:16])
+    v0, v1, v2 = d0 - b0 * bias_scale, d1 - b1 * bias_scale, d2 - b2 * bias_scale
     for i in range(3):
         r0, r1, r2 = three(rot[i])
-        increment = r0 * dv0 + r1 * dv1 + r2 * dv2
+        increment = r0 * v0 + r1 * v1 + r2 * v2
         if i == 2:
             increment += GRAVITY * velocity_dt
         before = out[4 + i]
@@ -83,14 +92,19 @@ def propagate_output(
 
 
 @kernel
-def attitude_error(q: Array, oldest: Array) -> Array:
-    """Return the small rotation (3,) in rad from the oldest output to the filter attitude."""
-    w, x, y, z = q[0], -q[1], -q[2], -q[3]
-    error = quat_normalise(quat_multiply(np.array((w, x, y, z)), oldest))
-    scale = -2.0
-    if error[0] < 0.0:
-        scale = 2.0
-    return scale * error[1:4]
+def attitude_error(q: Array, oldest: Array) -> tuple[float, float, float]:
+    """Return the small rotation in rad from the oldest output to the filter attitude."""
+    w, x, y, z = four(q)
+    o0, o1, o2, o3 = four(oldest)
+    x, y, z = -x, -y, -z
+    e0 = w * o0 - x * o1 - y * o2 - z * o3
+    e1 = w * o1 + x * o0 + y * o3 - z * o2
+    e2 = w * o2 - x * o3 + y * o0 + z * o1
+    e3 = w * o3 + x * o2 - y * o1 + z * o0
+    scale = -2.0 / math.sqrt(e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3)
+    if e0 < 0.0:
+        scale = -scale
+    return scale * e1, scale * e2, scale * e3
 
 
 @kernel
@@ -104,22 +118,24 @@ def correct_output(
     and position of the whole history move towards the filter (PI); integral (6,) of their errors.
     errors (3,) receives the norms of the attitude, velocity and position errors.
     """
-    error = attitude_error(x[0:4], history[oldest, 0:4])
-    correction[:] = error * att_gain
+    e0, e1, e2 = attitude_error(x, history[oldest])
+    correction[0], correction[1], correction[2] = e0 * att_gain, e1 * att_gain, e2 * att_gain
+    errors[0] = length(e0, e1, e2)
     difference = x[4:10] - history[oldest, 4:10]
     integral += difference
     shift = np.empty(6)
-    shift[0:3] = difference[0:3] * vel_gain + integral[0:3] * (vel_gain * vel_gain * 0.1)
-    shift[3:6] = difference[3:6] * pos_gain + integral[3:6] * (pos_gain * pos_gain * 0.1)
+    for i in range(6):
+        gain = vel_gain if i < 3 else pos_gain
+        shift[i] = difference[i] * gain + integral[i] * (gain * gain * 0.1)
     history[:, 4:10] += shift
     out[4:10] += shift
-    errors[0] = length(error)
-    errors[1] = length(difference[0:3])
-    errors[2] = length(difference[3:6])
+    d0, d1, d2 = three(difference)
+    errors[1] = length(d0, d1, d2)
+    d0, d1, d2 = three(difference[3:6])
+    errors[2] = length(d0, d1, d2)
 
 
 @kernel
-def length(v: Array) -> float:
-    """Return |v| of a vector (3,)."""
-    v0, v1, v2 = three(v)
+def length(v0: float, v1: float, v2: float) -> float:
+    """Return the length of a vector."""
     return math.sqrt(v0 * v0 + v1 * v1 + v2 * v2)

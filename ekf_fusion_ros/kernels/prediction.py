@@ -21,10 +21,9 @@ from ekf_fusion_ros.kernels.update import ACCEL_BIAS_VARIANCE_MAX
 from ekf_fusion_ros.kernels.update import MAG_ACTIVE
 from ekf_fusion_ros.kernels.update import WIND_ACTIVE
 from ekf_fusion_ros.kernels.update import limit_covariance
-from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
-from ekf_fusion_ros.mathlib.rotation import quat_from_rotation_vector
-from ekf_fusion_ros.mathlib.rotation import quat_multiply
-from ekf_fusion_ros.mathlib.rotation import quat_normalise
+from ekf_fusion_ros.mathlib.rotation import exponential
+from ekf_fusion_ros.mathlib.rotation import fill_matrix
+from ekf_fusion_ros.mathlib.rotation import rotate
 
 Array = NDArray[np.float64]
 GRAVITY = 9.80665
@@ -34,9 +33,6 @@ POSITION_LOST_VARIANCE = 1e4
 
 FIELD_LEARNED_VARIANCE = 0.1
 WIND_LEARNED_VARIANCE = 1.0
-OBSERVABLE_COS = 0.8
-"""Share of gravity along an accelerometer axis from which its bias shows at rest."""
-
 HEIGHT_RATE_TIME = 10.0
 """Time constant in s of the height rate by which the wind changes faster."""
 
@@ -48,11 +44,17 @@ DRIFT_SPEED = 1.0
 
 PROCESS = np.dtype([
     ('transition', 'f8', (10, 24)), ('angle_var', 'f8'), ('velocity_var', 'f8', (3,)),
-    ('noise', 'f8', (24,)), ('saved', 'f8', (3,)), ('height_rate', 'f8'), ('wind_noise', 'f8'),
-    ('position_drift_var', 'f8'), ('yaw_drift_var', 'f8')])
-"""What the covariance prediction keeps and is told: scratch for F, noise of the increments in
-rad^2 and (m/s)^2, additive noise of the states, variances of frozen accelerometer biases, the
-low-passed height rate in m/s, sigma of the wind and drift variances per period."""
+    ('noise', 'f8', (24,)), ('height_rate', 'f8'), ('wind_noise', 'f8'),
+    ('position_drift_var', 'f8'), ('yaw_drift_var', 'f8'), ('accel_lpf', 'f8', (2,)),
+    ('travel', 'f8', (2,)),
+    ('accel_bias_limit', 'f8'), ('saved', 'f8', (3,)), ('peaks', 'f8', (2,)),
+    ('peak_limits', 'f8', (2,)), ('peak_decay', 'f8')])
+"""What the prediction keeps and is told: scratch for F, noise of the increments in rad^2 and
+(m/s)^2, additive noise of the states, the low-passed height rate in m/s, sigma of the wind and
+drift variances per period, the leaky sum of predict_state,
+the predicted displacement NE in m since it was last asked for; largest accelerometer bias in m/s^2,
+variances of frozen ones, and peaks of rate in rad/s and specific force in m/s^2, above whose limits
+none is learned, with the factor per period by which they fall."""
 
 
 STATE_LIMITS = np.repeat(
@@ -68,12 +70,23 @@ def predict_state(x: Array, rot: Array, imu: Array, earth_rate: Array, accel_lpf
     earth_rate (3,) rad/s NED. accel_lpf (2,) is a leaky sum of the horizontal velocity increments,
     m/s^2 for a time constant of 1 s.
     """
-    turned = np.dot(earth_rate, rot)
-    correction = imu[0:3] - x[10:13] - turned * imu[6]
-    x[0:4] = quat_normalise(quat_multiply(x[0:4], quat_from_rotation_vector(correction)))
-    rot[:, :] = matrix_from_quat(x[0:4])
-    dv0, dv1, dv2 = three(imu[3:6] - x[13:16])
-    dt = imu[7]
+    a0, a1, a2 = three(imu)
+    b0, b1, b2 = three(x[10:13])
+    e0, e1, e2 = three(earth_rate)
+    n0, n1, n2 = three(rot[0])
+    m0, m1, m2 = three(rot[1])
+    d0, d1, d2 = three(rot[2])
+    dt = float(imu[6])
+    q0, q1, q2, q3 = exponential(
+        a0 - b0 - (e0 * n0 + e1 * m0 + e2 * d0) * dt,
+        a1 - b1 - (e0 * n1 + e1 * m1 + e2 * d1) * dt,
+        a2 - b2 - (e0 * n2 + e1 * m2 + e2 * d2) * dt)
+    rotate(x, q0, q1, q2, q3)
+    fill_matrix(x, rot)
+    a0, a1, a2 = three(imu[3:6])
+    b0, b1, b2 = three(x[13:16])
+    dv0, dv1, dv2 = a0 - b0, a1 - b1, a2 - b2
+    dt = float(imu[7])
     decay = 1.0 - dt
     for i in range(3):
         r0, r1, r2 = three(rot[i])
@@ -85,33 +98,6 @@ def predict_state(x: Array, rot: Array, imu: Array, earth_rate: Array, accel_lpf
         previous = x[4 + i]
         x[4 + i] = previous + increment
         x[7 + i] += 0.5 * (previous + x[4 + i]) * dt
-
-
-@kernel
-def advance_state(
-    x: Array, rot: Array, imu: Array, earth_rate: Array, accel_lpf: Array, dt_avg: float,
-    accel_bias_limit: float, peaks: Array, decay: float,
-) -> tuple[float, float, float, int, float]:
-    """Predict and limit the state; dt_avg is the mean filter period in s so far.
-
-    peaks (2,) follow rate in rad/s and specific force in m/s^2; they fall by the factor decay.
-    Returns the new mean filter period, both peaks, a word with bit k set where gravity shows the
-    bias of accelerometer axis k, and the accelerometer bias along the vertical in m/s.
-    """
-    predict_state(x, rot, imu, earth_rate, accel_lpf)
-    limit_state(x, dt_avg, accel_bias_limit)
-    rate = math.sqrt(imu[0] ** 2 + imu[1] ** 2 + imu[2] ** 2) / NOMINAL_PERIOD
-    force = math.sqrt(imu[3] ** 2 + imu[4] ** 2 + imu[5] ** 2) / NOMINAL_PERIOD
-    peaks[0] = max(rate, decay * peaks[0])
-    peaks[1] = max(force, decay * peaks[1])
-    mean_dt = float(0.5 * (imu[6] + imu[7]))
-    mean_dt = min(max(mean_dt, 0.5 * NOMINAL_PERIOD), 2.0 * NOMINAL_PERIOD)
-    observable = 0
-    for k in range(3):
-        if abs(rot[2, k]) > OBSERVABLE_COS:
-            observable += 1 << k
-    down_bias = x[13] * rot[2, 0] + x[14] * rot[2, 1] + x[15] * rot[2, 2]
-    return 0.99 * dt_avg + 0.01 * mean_dt, peaks[0], peaks[1], observable, down_bias
 
 
 @kernel
@@ -153,9 +139,11 @@ def fill_transition(q: Array, da: Array, dv: Array, dt: float, f: Array) -> None
     f[6, 1] = 2.0 * (q3 * x + q0 * y) - 4.0 * q1 * z
     f[6, 2] = 2.0 * (q3 * y - q0 * x) - 4.0 * q2 * z
     f[6, 3] = 2.0 * (q1 * x + q2 * y)
-    rot = matrix_from_quat(q)
-    f[4:7, 13:16] = -rot
+    rot = f[4:7, 13:16]
+    fill_matrix(q, rot)
     for i in range(3):
+        for j in range(3):
+            rot[i, j] = -rot[i, j]
         f[4 + i, 4 + i] = 1.0
         f[7 + i, 7 + i] = 1.0
         f[7 + i, 4 + i] = dt
@@ -173,19 +161,9 @@ def _add_unless_learned(p: Array, noise: Array, first: int, size: int, limit: fl
 
 
 @kernel
-def _add_input_noise(block: Array, f: Array, angle_var: float, velocity_var: Array) -> None:
-    """Add G Q G' to block (10, 10); G is minus the bias columns of F (10, 24).
-
-    The biases act on the same increments as the noise.
-    """
-    angle = np.ascontiguousarray(f[0:4, 10:13])
-    velocity = np.ascontiguousarray(f[4:7, 13:16])
-    block[0:4, 0:4] += angle_var * np.dot(angle, angle.T)
-    block[4:7, 4:7] += np.dot(velocity * velocity_var, velocity.T)
-
-
-@kernel
-def _propagate_by_element(f: Array, p: Array) -> tuple[Array, Array]:
+def _propagate_by_element(
+    f: Array, p: Array, angle_var: float, velocity_var: Array,
+) -> tuple[Array, Array]:
     top = np.empty((10, 24))
     for i in range(4):
         for j in range(24):
@@ -202,26 +180,46 @@ def _propagate_by_element(f: Array, p: Array) -> tuple[Array, Array]:
             top[i, j] = p[i, j] + f[i, i - 3] * p[i - 3, j]
     block = np.empty((10, 10))
     for i in range(10):
-        for j in range(4):
+        for j in range(min(i + 1, 4)):
             block[i, j] = (top[i, 0] * f[j, 0] + top[i, 1] * f[j, 1] + top[i, 2] * f[j, 2]
                            + top[i, 3] * f[j, 3] + top[i, 10] * f[j, 10] + top[i, 11] * f[j, 11]
                            + top[i, 12] * f[j, 12])
-        for j in range(4, 7):
+        for j in range(4, min(i + 1, 7)):
             block[i, j] = (top[i, j] + top[i, 0] * f[j, 0] + top[i, 1] * f[j, 1]
                            + top[i, 2] * f[j, 2] + top[i, 3] * f[j, 3] + top[i, 13] * f[j, 13]
                            + top[i, 14] * f[j, 14] + top[i, 15] * f[j, 15])
-        for j in range(7, 10):
+        for j in range(7, i + 1):
             block[i, j] = top[i, j] + top[i, j - 3] * f[j, j - 3]
+    for i in range(4):
+        for j in range(i + 1):
+            block[i, j] += angle_var * (
+                f[i, 10] * f[j, 10] + f[i, 11] * f[j, 11] + f[i, 12] * f[j, 12])
+    for i in range(4, 7):
+        for j in range(4, i + 1):
+            block[i, j] += (velocity_var[0] * f[i, 13] * f[j, 13]
+                            + velocity_var[1] * f[i, 14] * f[j, 14]
+                            + velocity_var[2] * f[i, 15] * f[j, 15])
+    for i in range(10):
+        for j in range(i):
+            block[j, i] = block[i, j]
     return top, block
 
 
-def _propagate_as_arrays(f: Array, p: Array) -> tuple[Array, Array]:
+def _propagate_as_arrays(
+    f: Array, p: Array, angle_var: float, velocity_var: Array,
+) -> tuple[Array, Array]:
     top = f @ p
-    return top, top @ f.T
+    block = top @ f.T
+    angle, velocity = f[0:4, 10:13], f[4:7, 13:16]
+    block[0:4, 0:4] += angle_var * (angle @ angle.T)
+    block[4:7, 4:7] += (velocity * velocity_var) @ velocity.T
+    return top, 0.5 * (block + block.T)
 
 
 propagate = _propagate_by_element if COMPILED else _propagate_as_arrays
-"""F P (10, 24) and F P F' (10, 10) of f (10, 24), with and without the zeros of F."""
+"""F P (10, 24) and the symmetric F P F' + G Q G' (10, 10) of f (10, 24), with and without the zeros
+of F. G is minus the bias columns of F: the biases act on the same increments as the noise, whose
+variances are angle_var rad^2 and velocity_var (3,) (m/s)^2."""
 
 
 @kernel
@@ -249,7 +247,6 @@ def advance_covariance(
     if s['yaw_drift_var'] > 0.0:
         add_yaw_variance(p, x, s['yaw_drift_var'])
     limits[ACCEL_BIAS_VARIANCE_MAX] = (0.1 * GRAVITY * dt_avg) ** 2
-    p[0:10, 0:10] = 0.5 * (p[0:10, 0:10] + p[0:10, 0:10].T)
     limit_covariance(p, limits)
 
 
@@ -275,16 +272,14 @@ def predict_covariance(
     magnetic and wind blocks are zero.
     """
     fill_transition(x[0:4], imu[0:3] - x[10:13], imu[3:6] - x[13:16], NOMINAL_PERIOD, f)
-    frozen = p[7, 7] + p[8, 8] > POSITION_LOST_VARIANCE
-    top, block = propagate(f, p)
-    _add_input_noise(block, f, angle_var, velocity_var)
-    kept = p[7:9, :].copy()
+    top, block = propagate(f, p, angle_var, velocity_var)
+    if p[7, 7] + p[8, 8] > POSITION_LOST_VARIANCE:
+        top[7:9, 10:24] = p[7:9, 10:24]
+        block[7:9, :] = p[7:9, 0:10]
+        block[:, 7:9] = p[0:10, 7:9]
+    p[0:10, 0:10] = block
     p[0:10, 10:24] = top[:, 10:24]
     p[10:24, 0:10] = top[:, 10:24].T
-    p[0:10, 0:10] = block
-    if frozen:
-        p[7:9, :] = kept
-        p[:, 7:9] = kept.T
     for i in range(7, 16):
         p[i, i] += noise[i]
     if limits[MAG_ACTIVE] != 0.0:

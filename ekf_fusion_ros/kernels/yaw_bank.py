@@ -33,14 +33,20 @@ MODELS = 5
 BANK = np.dtype([
     ('rot', 'f8', (MODELS, 3, 3)), ('bias', 'f8', (MODELS, 3)), ('state', 'f8', (MODELS, 3)),
     ('cov', 'f8', (MODELS, 3, 3)), ('weights', 'f8', (MODELS,)), ('accel', 'f8', (3,)),
-    ('composite', 'f8', (2,))])
-"""The models, the low-passed specific force in m/s^2, and yaw and variance of the sum."""
+    ('composite', 'f8', (2,)), ('tilt_aligned', 'f8'), ('running', 'f8')])
+"""The models, the low-passed specific force in m/s^2, yaw and variance of the sum, whether the
+references have found the tilt, and whether the filters run."""
 
 
 @kernel
-def advance_bank(bank: NDArray[np.void], imu: Array, airspeed: float, running: bool) -> None:
-    """Advance every model of one BANK over imu (8,) and combine them, in place."""
+def advance_bank(bank: NDArray[np.void], imu: Array, airspeed: float) -> None:
+    """Advance every model of one BANK over imu (8,) and combine them, in place.
+
+    Nothing is done before the tilt is known.
+    """
     s = bank[0]
+    if s['tilt_aligned'] == 0.0:
+        return
     rot, accel = s['rot'], s['accel']
     share = min(10.0 * imu[7] * TILT_GAIN, 1.0)
     dt = max(imu[7], 1e-3)
@@ -53,7 +59,7 @@ def advance_bank(bank: NDArray[np.void], imu: Array, airspeed: float, running: b
         attenuation = 1.0
     excess = min(attenuation * abs(norm - GRAVITY) / GRAVITY, 1.0)
     predict_attitudes(rot, s['bias'], imu, accel, TILT_GAIN * (1.0 - excess) ** 2, airspeed)
-    if running:
+    if s['running'] != 0.0:
         predict_models(rot, s['state'], s['cov'], imu)
         combine_models(s['state'], s['cov'], s['weights'], s['composite'])
 

@@ -47,11 +47,29 @@ def quat_normalise(q: Array) -> Array:
 def quat_from_rotation_vector(r: Array) -> Array:
     """Return the quaternion of a rotation vector (3,) in rad; identity below 1e-10 rad."""
     r0, r1, r2 = three(r)
+    return np.array(exponential(r0, r1, r2))
+
+
+@kernel
+def exponential(r0: float, r1: float, r2: float) -> tuple[float, float, float, float]:
+    """Return the quaternion of a rotation vector in rad; identity below 1e-10 rad."""
     angle = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
     if angle < 1e-10:
-        return np.array((1.0, 0.0, 0.0, 0.0))
+        return 1.0, 0.0, 0.0, 0.0
     s = math.sin(0.5 * angle) / angle
-    return np.array((math.cos(0.5 * angle), s * r0, s * r1, s * r2))
+    return math.cos(0.5 * angle), s * r0, s * r1, s * r2
+
+
+@kernel
+def rotate(p: Array, q0: float, q1: float, q2: float, q3: float) -> None:
+    """Multiply p (4,) by a quaternion from the right and normalise it, in place."""
+    p0, p1, p2, p3 = four(p)
+    w = p0 * q0 - p1 * q1 - p2 * q2 - p3 * q3
+    x = p0 * q1 + p1 * q0 + p2 * q3 - p3 * q2
+    y = p0 * q2 - p1 * q3 + p2 * q0 + p3 * q1
+    z = p0 * q3 + p1 * q2 - p2 * q1 + p3 * q0
+    norm = math.sqrt(w * w + x * x + y * y + z * z)
+    p[0], p[1], p[2], p[3] = w / norm, x / norm, y / norm, z / norm
 
 
 @kernel
@@ -67,9 +85,16 @@ def rotation_vector_from_quat(q: Array) -> Array:
 @kernel
 def matrix_from_quat(q: Array) -> Array:
     """Return the rotation matrix (3, 3) in the homogeneous form, quadratic in q."""
+    rot = np.empty((3, 3))
+    fill_matrix(q, rot)
+    return rot
+
+
+@kernel
+def fill_matrix(q: Array, rot: Array) -> None:
+    """Write matrix_from_quat(q) into rot (3, 3)."""
     q0, q1, q2, q3 = four(q)
     a, b, c, d = q0 * q0, q1 * q1, q2 * q2, q3 * q3
-    rot = np.empty((3, 3))
     rot[0, 0] = a + b - c - d
     rot[0, 1] = 2.0 * (q1 * q2 - q0 * q3)
     rot[0, 2] = 2.0 * (q1 * q3 + q0 * q2)
@@ -79,7 +104,6 @@ def matrix_from_quat(q: Array) -> Array:
     rot[2, 0] = 2.0 * (q1 * q3 - q0 * q2)
     rot[2, 1] = 2.0 * (q2 * q3 + q0 * q1)
     rot[2, 2] = a - b - c + d
-    return rot
 
 
 @kernel

@@ -25,6 +25,7 @@ from ekf_fusion_ros.ekf2.aid_sources.vision_body_velocity import fuse_body_veloc
 from ekf_fusion_ros.ekf2.covariance import Covariance
 from ekf_fusion_ros.ekf2.covariance import quat_by_rotation_vector
 from ekf_fusion_ros.ekf2.covariance import rotation_vector_variances
+from ekf_fusion_ros.ekf2.delayed_imu import DelayedImu
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.heading import HeadingFusion
 from ekf_fusion_ros.ekf2.heading import mag_yaw
@@ -236,6 +237,12 @@ def test_yaw_variance_is_about_the_vertical_of_the_earth(q):
 
 # ---- noise of the prediction ----
 
+def predict(cov, x, clipping):
+    """Predict P over a period in free fall without rotation."""
+    period = DelayedImu(0, np.zeros(8), clipping)
+    cov.predict(x, np.eye(3), period, np.zeros(3), 0.01, in_air=True, bad_accel=False)
+
+
 def test_inertial_noise_reaches_attitude_and_velocity():
     """Noise of increments over one nominal period, from a state that is known exactly."""
     params = Ekf2Params()
@@ -243,7 +250,7 @@ def test_inertial_noise_reaches_attitude_and_velocity():
     q = from_scipy(Rotation.from_euler('ZYX', (0.3, 0.2, -0.4)).as_quat())
     x = np.zeros(24)
     x[0:4] = q
-    cov.predict(x, np.zeros(8), 0.01, False, (False, False, False))
+    predict(cov, x, (False, False, False))
     attitude = pose_covariance(q, cov.p)[3:6, 3:6]
     np.testing.assert_allclose(attitude, (0.01 * 1.5e-2) ** 2 * np.eye(3), atol=1e-15)
     np.testing.assert_allclose(cov.p[4:7, 4:7], (0.01 * 0.35) ** 2 * np.eye(3), atol=1e-15)
@@ -255,6 +262,6 @@ def test_a_clipped_axis_is_noisy_in_its_own_direction():
     turn = Rotation.from_euler('ZYX', (0.3, 0.2, -0.4))
     x = np.zeros(24)
     x[0:4] = from_scipy(turn.as_quat())
-    cov.predict(x, np.zeros(8), 0.01, False, (False, True, False))
+    predict(cov, x, (False, True, False))
     own = turn.as_matrix().T @ cov.p[4:7, 4:7] @ turn.as_matrix()
     np.testing.assert_allclose(own, np.diag((0.0035, 0.049, 0.0035)) ** 2, atol=1e-15)

@@ -11,9 +11,12 @@ from oracles import to_scipy
 from oracles import vectors
 import pytest
 
+from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.output_predictor import OutputPredictor
+from ekf_fusion_ros.ekf2.yaw_estimator import YawEstimator
 from ekf_fusion_ros.kernels.output import attitude_error
 from ekf_fusion_ros.kernels.output import propagate_output
+from ekf_fusion_ros.params.ekf2 import Ekf2Params
 from ekf_fusion_ros.params.ekf2 import OutputParams
 from ekf_fusion_ros.samples import ImuSample
 
@@ -56,9 +59,8 @@ def test_attitude_error_takes_the_output_to_the_filter(q, error):
 
 def test_an_error_of_the_output_dies_out_with_the_time_constants():
     params = OutputParams(vel_tau=0.25, pos_tau=0.25)
-    predictor = OutputPredictor(params, 12)
-    x = np.zeros(24)
-    x[0] = 1.0
+    predictor, f, bank = OutputPredictor(params, 12), Filter(Ekf2Params(), 12), YawEstimator()
+    x, f.dt_imu_avg, f.dt_avg = f.x, DT, 2.0 * DT
     predictor.align(x)
     predictor.now[4:10] = (1.0, -1.0, 0.5, 2.0, -3.0, 1.0)
     predictor.now[0:4] = (np.cos(0.05), 0.0, 0.0, np.sin(0.05))
@@ -66,9 +68,10 @@ def test_an_error_of_the_output_dies_out_with_the_time_constants():
     sizes = []
     for k in range(4000):
         sample = ImuSample(k * 5000, np.zeros(3), at_rest, DT, DT)
-        predictor.propagate(sample, x, DT, 2.0 * DT)
-        if k % 2:
-            predictor.correct(x, 0.11, DT, 2.0 * DT)
+        if k % 2 == 0:
+            predictor.propagate(sample, x, DT, 2.0 * DT)
+        else:
+            predictor.finish_period(sample, f, 0.11, bank, 0.0)
             sizes.append(np.abs(predictor.now[4:10]).max())
     # a second, four time constants, after the delay has passed
     assert sizes[111] < 0.2 * sizes[11]

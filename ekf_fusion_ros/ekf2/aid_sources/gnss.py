@@ -63,6 +63,7 @@ class Gnss:
         self._align_to_course = align_to_course
         self._yaw = GnssYaw(f, resets)
         self.buffer: SampleBuffer[GnssFix] = SampleBuffer(capacity)
+        self.popped = False
         self.last_arrival_us = 0
         self.height_intermittent = True
         self.vision_yaw_forbidden = False
@@ -145,20 +146,26 @@ class Gnss:
         self._resets.move_vertically(origin.alt - altitude_before)
         return True
 
-    def pop(self) -> bool:
-        """Take the fix at the horizon; True when there was one."""
-        popped = self.buffer.pop_first_older_than(self._f.t_horizon)
-        if popped is None:
-            return False
-        if self._f.fix is not None:
-            self._previous_fix_us = self._f.fix.time_us
-        self._f.fix = popped[1]
-        return True
+    def check_arrival(self) -> None:
+        """Judge whether heights keep coming; call before `pop`."""
+        fixes = self.buffer
+        self.height_intermittent = (
+            fixes.newest_time_us + INTERMITTENT_US <= self._f.t_now
+            or fixes.newest is None or not math.isfinite(fixes.newest.altitude))
 
-    def step(self, popped: bool) -> None:
+    def pop(self) -> None:
+        """Take the fix at the horizon."""
+        popped = self.buffer.pop_first_older_than(self._f.t_horizon)
+        self.popped = popped is not None
+        if popped is not None:
+            if self._f.fix is not None:
+                self._previous_fix_us = self._f.fix.time_us
+            self._f.fix = popped[1]
+
+    def step(self) -> None:
         """Run once per filter period."""
         f = self._f
-        if not popped:
+        if not self.popped:
             self._watch_silence()
             return
         assert f.fix is not None

@@ -64,6 +64,7 @@ class Magnetometer:
         self.buffer: SampleBuffer[Array] = SampleBuffer(capacity)
         self.lpf = np.zeros(3)
         self.count = 0
+        self.popped = False
         self.field = np.zeros(3)
         self.aligned_us = 0
         self.inhibit_reset_request = False
@@ -88,11 +89,12 @@ class Magnetometer:
         if mean is not None:
             self.buffer.push(*mean)
 
-    def pop(self) -> bool:
-        """Take the sample at the horizon into `field` and its low-pass; True if there was one."""
+    def pop(self) -> None:
+        """Take the sample at the horizon into `field` and its low-pass."""
         popped = self.buffer.pop_first_older_than(self._f.t_horizon)
+        self.popped = popped is not None
         if popped is None:
-            return False
+            return
         measured = popped[1]
         if self.count:
             low_pass(self.lpf, measured, LPF_SHARE)
@@ -102,7 +104,6 @@ class Magnetometer:
         self.field = measured
         if self._f.params.mag.synthesize_z:
             self._replace_z(measured)
-        return True
 
     def _replace_z(self, measured: Array) -> None:
         z = synthetic_z(self._f, measured)
@@ -110,8 +111,8 @@ class Magnetometer:
         if z is not None:
             self.field = np.array((measured[0], measured[1], z))
 
-    def step(self, popped: bool, checks: GnssChecks) -> None:
-        """Run once per filter period; popped: a new sample is in `field`."""
+    def step(self, checks: GnssChecks) -> None:
+        """Run once per filter period."""
         f = self._f
         flags = f.flags
         if f.params.mag.check_strength:
@@ -129,7 +130,7 @@ class Magnetometer:
         self._other_yaw_before = not no_other_yaw
         if other_yaw_ended or not flags.yaw_align or self.inhibit_reset_request:
             f.yaw_reset_requested = True
-        if not no_other_yaw or not popped:
+        if not no_other_yaw or not self.popped:
             return
         self._select()
         self._realign_yaw_if_requested()

@@ -60,7 +60,8 @@ class RangeFinder:
         """Take the sample at the horizon and judge it; once per filter period."""
         now = self._f.t_horizon
         if not self._last_arrival_us:
-            self._note_age(now)
+            if self._interval_us < INTERVAL_LIMIT_US:
+                self._note_age(now)
             return
         self.fresh = False
         self._cos_tilt = self._tilt()

@@ -35,6 +35,7 @@ class Vision:
         """Act on a filter through its resets and heading fusion."""
         self._f = f
         self.buffer: SampleBuffer[VisionSample] = SampleBuffer(capacity)
+        self.popped = False
         self.last_arrival_us = 0
         self.delayed_us = 0
         self.position = VisionPosition(f, resets)
@@ -50,22 +51,19 @@ class Vision:
         delay_us = round(self._f.params.vision.delay_ms * 1000) + FILTER_PERIOD_US // 2
         self.buffer.push(sample.time_us - delay_us, sample)
 
-    def pop(self) -> bool:
-        """Take the sample at the horizon; True when there was one."""
+    def pop(self) -> None:
+        """Take the sample at the horizon."""
         popped = self.buffer.pop_first_older_than(self._f.t_horizon)
-        if popped is None:
-            return False
-        self.delayed_us, self._f.vision = popped
-        return True
+        self.popped = popped is not None
+        if popped is not None:
+            self.delayed_us, self._f.vision = popped
 
-    def step(self, popped: bool, checks: GnssChecks, yaw_forbidden: bool) -> None:
+    def step(self, checks: GnssChecks, yaw_forbidden: bool) -> None:
         """Run once per filter period."""
-        f = self._f
-        if f.flags.ev_pos:
-            self.position.travel()
-        if popped:
+        if self.popped:
             self._use(checks.healthy, yaw_forbidden)
             return
+        f = self._f
         flags = f.flags
         active = flags.ev_pos or flags.ev_vel or flags.ev_yaw
         if active and f.late(self.last_arrival_us, DATA_TIMEOUT_US):

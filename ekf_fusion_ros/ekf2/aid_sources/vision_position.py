@@ -11,8 +11,6 @@ from ekf_fusion_ros.ekf2.fusion import fuse_horizontal_position
 from ekf_fusion_ros.ekf2.fusion import fuse_horizontal_velocity
 from ekf_fusion_ros.ekf2.resets import Resets
 from ekf_fusion_ros.ekf2.state import SECOND
-from ekf_fusion_ros.ekf2.state import VE
-from ekf_fusion_ros.ekf2.state import VN
 from ekf_fusion_ros.kernels.vision import turn_displacement
 from ekf_fusion_ros.samples import VisionSample
 
@@ -30,7 +28,6 @@ class VisionPosition:
         self._f = f
         self._resets = resets
         self._previous: VisionSample | None = None
-        self._north = self._east = 0.0
         self._velocity_resets = 0
 
     def start(self) -> None:
@@ -72,13 +69,6 @@ class VisionPosition:
         fuse_horizontal_position(f, f.observations.ev_hor_pos, innovation, noise,
                                  f.params.vision.pos_gate)
 
-    def travel(self) -> None:
-        """Add up the predicted displacement; once per filter period."""
-        f = self._f
-        dt = f.imu.increments.item(7)
-        self._north += f.x.item(VN) * dt
-        self._east += f.x.item(VE) * dt
-
     def _fuse_displacement(self, sample: VisionSample) -> None:
         """Fuse the mean velocity over the interval between two samples.
 
@@ -88,8 +78,8 @@ class VisionPosition:
         """
         f = self._f
         previous, self._previous = self._previous, sample
-        north, east = self._north, self._east
-        self._north = self._east = 0.0
+        north, east = f.travel.tolist()
+        f.travel[:] = 0.0
         velocity_resets = self._resets.counters.vel_ne
         jumped = velocity_resets != self._velocity_resets
         self._velocity_resets = velocity_resets
