@@ -147,7 +147,7 @@ class Control:
         return 0.0 if f.airspeed is None else f.airspeed.true_airspeed
 
     def correct_bank(self) -> None:
-        """Let the yaw bank use its velocity, and offer it that of a new fix for the next period."""
+        """Let the yaw bank use its velocity, and offer it that of a new fix for the next step."""
         f = self._f
         self.bank.correct(f.imu.increments, f.flags.in_air, f.x, f.dt_avg)
         fix = f.fix

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from ekf_fusion_ros.ekf2.delayed_imu import DelayedImu
 from ekf_fusion_ros.ekf2.state import FILTER_PERIOD
 from ekf_fusion_ros.ekf2.state import SIZE
+from ekf_fusion_ros.kernels.body_velocity import Three
+from ekf_fusion_ros.kernels.body_velocity import fuse_body_velocity
 from ekf_fusion_ros.kernels.compile import kernel
 from ekf_fusion_ros.kernels.heading import apply_yaw
 from ekf_fusion_ros.kernels.magnetic import fuse_declination
@@ -149,6 +151,14 @@ class Covariance:
         outcome: tuple[float, float, float, int] = fuse_two_states(
             self.p, x, first, innovation[0], innovation[1], noise[0], noise[1], gate,
             largest_ratio, self.limits)
+        return outcome
+
+    def fuse_body_velocity(
+        self, x: Array, measured: Array, noise: Array, gate: float,
+    ) -> tuple[Three, Three, Three, int]:
+        """Gate and fuse a velocity in body axes; see kernels.body_velocity.fuse_body_velocity."""
+        outcome: tuple[Three, Three, Three, int] = fuse_body_velocity(
+            self.p, x, measured, noise, gate, self.limits)
         return outcome
 
     def fuse_field(

@@ -10,8 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.kernels.compile import kernel
+from ekf_fusion_ros.kernels.compile import three
+from ekf_fusion_ros.kernels.update import apply_update
+from ekf_fusion_ros.kernels.update import test_ratio
 
 Array = NDArray[np.float64]
+Three = tuple[float, float, float]
 
 
 @kernel
@@ -45,3 +49,39 @@ def body_velocity(q: Array, velocity: Array, body: Array, jacobian: Array) -> No
     jacobian[2, 6] = ww - xx - yy + zz
     for i in range(3):
         body[i] = jacobian[i, 4] * a + jacobian[i, 5] * b + jacobian[i, 6] * c
+
+
+@kernel
+def _project_rows(p: Array, jacobian: Array, row: int, hp: Array) -> float:
+    """Fill hp (24,) with H P, H a row of the jacobian (3, 7) by states 0 to 6; return H P H'."""
+    hp[:] = np.dot(jacobian[row], p[0:7])
+    return float(np.dot(jacobian[row], hp[0:7]))
+
+
+@kernel
+def fuse_body_velocity(
+    p: Array, x: Array, measured: Array, noise: Array, gate: float, limits: Array,
+) -> tuple[Three, Three, Three, int]:
+    """Gate and fuse a velocity (3,) in body axes, m/s; noise (3,) variances in (m/s)^2.
+
+    Forward and right are judged together, down by itself; each is fused about the state that the
+    axes before have corrected. Returns innovations, variances and test ratios of all from before
+    the first, and a word whose bit i tells that the update of axis i was unhealthy.
+    """
+    body, jacobian, hp = np.empty(3), np.empty((3, 7)), np.empty(24)
+    innovation, variance, ratio = np.empty(3), np.empty(3), np.empty(3)
+    body_velocity(x, x[4:7], body, jacobian)
+    for axis in range(3):
+        innovation[axis] = body[axis] - measured[axis]
+        variance[axis] = _project_rows(p, jacobian, axis, hp) + noise[axis]
+        ratio[axis] = test_ratio(innovation[axis], variance[axis], gate)
+    faults = 0
+    for axis in range(3):
+        judged = ratio[2] if axis == 2 else max(ratio[0], ratio[1])
+        if judged > 1.0:
+            continue
+        body_velocity(x, x[4:7], body, jacobian)
+        spread = _project_rows(p, jacobian, axis, hp) + noise[axis]
+        if not apply_update(p, x, hp / spread, hp, body[axis] - measured[axis], limits):
+            faults += 1 << axis
+    return three(innovation), three(variance), three(ratio), faults

@@ -13,5 +13,5 @@ Array = NDArray[np.float64]
 @kernel
 def project(p: Array, h: Array, hp: Array) -> float:
     """Fill hp (24,) with H P and return H P H' for a Jacobian h (24,) and a symmetric P."""
-    hp[:] = np.dot(h, p)
+    np.dot(h, p, hp)
     return float(np.dot(hp, h))

@@ -12,10 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.kernels.compile import kernel
+from ekf_fusion_ros.kernels.innovation import project
 from ekf_fusion_ros.kernels.update import WIND_ACTIVE
 from ekf_fusion_ros.kernels.update import apply_update
+from ekf_fusion_ros.kernels.update import test_ratio
 
 Array = NDArray[np.float64]
+Three = tuple[float, float, float]
 
 DECLINATION_SPREAD = 0.5
 """Largest deviation in rad of the field's direction from the declination."""
@@ -62,15 +65,16 @@ def field_jacobian(x: Array, axis: int, h: Array) -> float:
 
 @kernel
 def predict_field(
-    x: Array, p: Array, measured: Array, noise: float, innovation: Array,
-) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Fill innovation (3,) in Gauss; return it and its variance in Gauss^2."""
-    h, variance = np.empty(24), np.empty(3)
+    x: Array, p: Array, measured: Array, noise: float, gate: float, innovation: Array,
+) -> tuple[Three, Three, Three]:
+    """Fill innovation (3,) in Gauss; return it, its variance in Gauss^2 and the test ratio."""
+    h, hp, variance, ratio = np.empty(24), np.empty(24), np.empty(3), np.empty(3)
     for axis in range(3):
         innovation[axis] = field_jacobian(x, axis, h) - measured[axis]
-        variance[axis] = np.dot(h, np.dot(p, h)) + noise
+        variance[axis] = project(p, h, hp) + noise
+        ratio[axis] = test_ratio(innovation[axis], variance[axis], gate)
     return ((innovation[0], innovation[1], innovation[2]),
-            (variance[0], variance[1], variance[2]))
+            (variance[0], variance[1], variance[2]), (ratio[0], ratio[1], ratio[2]))
 
 
 @kernel
@@ -82,14 +86,13 @@ def fuse_field_axis(
 
     The Jacobian is taken at the present x. Unless all_states, only the field states are corrected.
     """
-    h = np.empty(24)
+    h, hp = np.empty(24), np.empty(24)
     field_jacobian(x, axis, h)
-    hp = np.dot(h, p)
-    s = np.dot(hp, h) + noise
+    s = project(p, h, hp) + noise
     if s < noise:
         return 1
     variance[axis] = s
-    gain = np.dot(p, h) / s
+    gain = hp / s
     for k in range(3):
         if limits[k] != 0.0:
             gain[13 + k] = 0.0

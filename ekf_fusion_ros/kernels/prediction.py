@@ -51,10 +51,10 @@ PROCESS = np.dtype([
     ('peak_limits', 'f8', (2,)), ('peak_decay', 'f8')])
 """What the prediction keeps and is told: scratch for F, noise of the increments in rad^2 and
 (m/s)^2, additive noise of the states, the low-passed height rate in m/s, sigma of the wind and
-drift variances per period, the leaky sum of predict_state,
-the predicted displacement NE in m since it was last asked for; largest accelerometer bias in m/s^2,
-variances of frozen ones, and peaks of rate in rad/s and specific force in m/s^2, above whose limits
-none is learned, with the factor per period by which they fall."""
+drift variances per period, the leaky sum of predict_state, the predicted displacement NE in m since
+it was last asked for; the largest accelerometer bias in m/s^2, variances of frozen ones, and peaks
+of rate in rad/s and specific force in m/s^2, above whose limits none is learned, with the factor
+per period by which they fall."""
 
 
 STATE_LIMITS = np.repeat(
@@ -217,8 +217,8 @@ def _propagate_as_arrays(
 
 
 propagate = _propagate_by_element if COMPILED else _propagate_as_arrays
-"""F P (10, 24) and the symmetric F P F' + G Q G' (10, 10) of f (10, 24), with and without the zeros
-of F. G is minus the bias columns of F: the biases act on the same increments as the noise, whose
+"""F P (10, 24) and the symmetric F P F' + G Q G' (10, 10) of f (10, 24), with and without the
+zeros of F. G is minus the bias columns of F: biases act on the same increments as the noise, whose
 variances are angle_var rad^2 and velocity_var (3,) (m/s)^2."""
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ekf_fusion_ros.kernels.compile import COMPILED
 from ekf_fusion_ros.kernels.compile import kernel
-from ekf_fusion_ros.mathlib.rotation import quat_normalise
+from ekf_fusion_ros.mathlib.rotation import rotate
 
 Array = NDArray[np.float64]
 
@@ -24,6 +24,8 @@ bias in (m/s)^2 per period."""
 
 VARIANCE_MIN = np.array([0.0] * 4 + [1e-6] * 6 + [0.0] * 3)
 VARIANCE_MAX = np.array([1.0] * 4 + [1e6] * 6 + [1.0] * 3)
+FIELD_VARIANCE_MAX = 1.0
+WIND_VARIANCE_MAX = 1e6
 ACCEL_BIAS_VARIANCE_FLOOR = 5e-8
 ACCEL_BIAS_VARIANCE_SAFE = 1e-9
 
@@ -34,25 +36,39 @@ def _subtract_by_element(p: Array, gain: Array, hp: Array) -> bool:
         if p[i, i] < gain[i] * hp[i]:
             return False
     for i in range(24):
-        for j in range(i):
-            mean = 0.5 * ((p[i, j] - gain[i] * hp[j]) + (p[j, i] - gain[j] * hp[i]))
-            p[i, j] = mean
-            p[j, i] = mean
-        p[i, i] -= gain[i] * hp[i]
+        half_gain, half_hp = 0.5 * gain[i], 0.5 * hp[i]
+        for j in range(24):
+            p[i, j] -= half_gain * hp[j] + half_hp * gain[j]
     return True
 
 
 def _subtract_as_arrays(p: Array, gain: Array, hp: Array) -> bool:
     if (p.ravel()[::25] < gain * hp).any():
         return False
-    rest = p - np.multiply.outer(gain, hp)
-    p[:, :] = 0.5 * (rest + rest.T)
+    half = np.multiply.outer(0.5 * gain, hp)
+    p -= half + half.T
     return True
 
 
 subtract = _subtract_by_element if COMPILED else _subtract_as_arrays
 """P <- P - K H P with the halves averaged, for gain (24,) and H P (24,); False, and nothing done,
-where a variance would turn negative."""
+where a variance would turn negative. P stays as symmetric as it was, to the last bit."""
+
+
+@kernel
+def _move_by_element(x: Array, gain: Array, innovation: float) -> None:
+    for i in range(24):
+        x[i] -= gain[i] * innovation
+    rotate(x, 1.0, 0.0, 0.0, 0.0)
+
+
+def _move_as_arrays(x: Array, gain: Array, innovation: float) -> None:
+    x -= gain * innovation
+    rotate(x, 1.0, 0.0, 0.0, 0.0)
+
+
+move = _move_by_element if COMPILED else _move_as_arrays
+"""x <- x - K times the innovation, with the quaternion normalised."""
 
 
 @kernel
@@ -62,8 +78,28 @@ def limit_covariance(p: Array, limits: Array) -> None:
     The accelerometer-bias variances are kept within a ratio of 100; one that has collapsed
     decorrelates all three.
     """
-    diagonal = p.reshape(576)[::25]
-    diagonal[0:13] = np.minimum(np.maximum(diagonal[0:13], VARIANCE_MIN), VARIANCE_MAX)
+    for k in range(13):
+        p[k, k] = min(max(p[k, k], VARIANCE_MIN[k]), VARIANCE_MAX[k])
+    limit_accel_biases(p, limits)
+    limit_block(p, 16, 22, limits[MAG_ACTIVE] != 0.0, FIELD_VARIANCE_MAX)
+    limit_block(p, 22, 24, limits[WIND_ACTIVE] != 0.0, WIND_VARIANCE_MAX)
+
+
+@kernel
+def limit_block(p: Array, first: int, last: int, active: bool, largest: float) -> None:
+    """Clamp the variances of states in use; states that are not have no covariance."""
+    for k in range(first, last):
+        variance = p[k, k]
+        if active:
+            p[k, k] = min(max(variance, 0.0), largest)
+        elif variance != 0.0:
+            p[k, :] = 0.0
+            p[:, k] = 0.0
+
+
+@kernel
+def limit_accel_biases(p: Array, limits: Array) -> None:
+    """Keep the variances of the biases that are learned above the floor and near each other."""
     largest = ACCEL_BIAS_VARIANCE_SAFE
     collapsed = False
     free = 0
@@ -75,30 +111,18 @@ def limit_covariance(p: Array, limits: Array) -> None:
                 largest = variance
             elif variance < ACCEL_BIAS_VARIANCE_SAFE:
                 collapsed = True
-    if free > 0:
-        lower = max(0.01 * largest, ACCEL_BIAS_VARIANCE_FLOOR)
-        for k in range(3):
-            if limits[k] == 0.0:
-                p[13 + k, 13 + k] = min(max(p[13 + k, 13 + k], lower),
-                                      limits[ACCEL_BIAS_VARIANCE_MAX])
-        if collapsed:
-            for k in range(13, 16):
-                variance = p[k, k]
-                p[k, :] = 0.0
-                p[:, k] = 0.0
-                p[k, k] = variance
-    if limits[MAG_ACTIVE] != 0.0:
-        for k in range(16, 22):
-            p[k, k] = min(max(p[k, k], 0.0), 1.0)
-    else:
-        p[16:22, :] = 0.0
-        p[:, 16:22] = 0.0
-    if limits[WIND_ACTIVE] != 0.0:
-        for k in range(22, 24):
-            p[k, k] = min(max(p[k, k], 0.0), 1e6)
-    else:
-        p[22:24, :] = 0.0
-        p[:, 22:24] = 0.0
+    if free == 0:
+        return
+    lower = max(0.01 * largest, ACCEL_BIAS_VARIANCE_FLOOR)
+    for k in range(3):
+        if limits[k] == 0.0:
+            p[13 + k, 13 + k] = min(max(p[13 + k, 13 + k], lower), limits[ACCEL_BIAS_VARIANCE_MAX])
+    if collapsed:
+        for k in range(13, 16):
+            variance = p[k, k]
+            p[k, :] = 0.0
+            p[:, k] = 0.0
+            p[k, k] = variance
 
 
 @kernel
@@ -117,8 +141,7 @@ def apply_update(
                 p[:, i] = 0.0
         return False
     limit_covariance(p, limits)
-    x -= gain * innovation
-    x[0:4] = quat_normalise(x[0:4])
+    move(x, gain, innovation)
     return True
 
 
@@ -127,9 +150,8 @@ def apply_direct(
     p: Array, x: Array, state: int, variance: float, innovation: float, limits: Array,
 ) -> bool:
     """Update with an observation of one state whose innovation variance is given."""
-    gain = p[:, state] / variance
-    hp = p[state, :].copy()
-    return apply_update(p, x, gain, hp, innovation, limits)
+    hp = p[state].copy()
+    return apply_update(p, x, hp / variance, hp, innovation, limits)
 
 
 @kernel

@@ -20,7 +20,6 @@ from oracles import vectors
 import pytest
 
 from ekf_fusion_ros.ekf2.aid_sources.magnetic_fusion import fuse_declination
-from ekf_fusion_ros.ekf2.aid_sources.vision_body_velocity import body_velocity_jacobian
 from ekf_fusion_ros.ekf2.aid_sources.vision_body_velocity import fuse_body_velocity
 from ekf_fusion_ros.ekf2.covariance import Covariance
 from ekf_fusion_ros.ekf2.covariance import quat_by_rotation_vector
@@ -146,13 +145,6 @@ def test_declination(seed):
 
 def velocity_in_body(x):
     return sandwich(conjugate(x[0:4]), x[4:7])
-
-
-@MANY
-@given(q=quaternions(), velocity=vectors(3, 20.0))
-def test_body_velocity(q, velocity):
-    expected = difference(lambda s: velocity_in_body(np.concatenate([s, velocity])), q, 1e-2)
-    np.testing.assert_allclose(body_velocity_jacobian(q, velocity), expected, atol=1e-10)
 
 
 @settings(deadline=None, max_examples=10)

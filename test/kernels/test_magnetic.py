@@ -52,7 +52,8 @@ def test_gradient_of_each_axis(q, earth, body):
 def test_innovation_and_its_variance(seed, q, measured):
     x, p = state(q, np.array((0.2, 0.05, 0.43)), np.array((0.02, -0.01, 0.0))), covariance(seed)
     innovation = np.empty(3)
-    told, variance = predict_field(x, p, measured, NOISE, innovation)
+    told, variance, ratio = predict_field(x, p, measured, NOISE, 3.0, innovation)
+    np.testing.assert_allclose(ratio, innovation ** 2 / (9.0 * np.array(variance)), rtol=1e-12)
     np.testing.assert_array_equal(told, innovation)
     h = difference(field_in_body, x, 1e-2)
     np.testing.assert_allclose(innovation, field_in_body(x) - measured, atol=1e-14)

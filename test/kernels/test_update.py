@@ -116,6 +116,7 @@ def test_a_sound_covariance_passes_unchanged():
 
 def test_halves_are_averaged_where_a_gain_is_cut():
     p, x = covariance(1), state(1)
+    p = 0.5 * (p + p.T)
     hp, gain = p[8].copy(), p[:, 8] / (p[8, 8] + 0.3)
     gain[16:24] = 0.0
     whole = p - np.outer(gain, hp)

@@ -11,7 +11,6 @@ from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.state import EARTH_FIELD
 from ekf_fusion_ros.kernels.magnetic import limit_field
 from ekf_fusion_ros.kernels.magnetic import predict_field
-from ekf_fusion_ros.kernels.update import test_ratio
 
 Array = NDArray[np.float64]
 
@@ -39,29 +38,28 @@ def fuse_three_axes(f: Filter, measured: Array, all_states: bool) -> bool:
     params = f.params.mag
     noise = max(params.noise, 1e-3) ** 2
     innovation = np.empty(3)
-    innovations, variances = predict_field(f.x, f.cov.p, measured, noise, innovation)
+    innovations, variances, (x, y, z) = predict_field(
+        f.x, f.cov.p, measured, noise, params.gate, innovation)
     faults = f.faults
-    faults.mag_x, faults.mag_y, faults.mag_z = (s < noise for s in variances)
-    if faults.mag_x or faults.mag_y or faults.mag_z:
+    if min(variances) < noise:
+        faults.mag_x, faults.mag_y, faults.mag_z = (s < noise for s in variances)
         _restart_field_covariance(f)
         return False
     if f.flags.synthetic_mag_z:
-        innovations = (*innovations[0:2], 0.0)
-    ratios = [test_ratio(i, s, params.gate) for i, s in zip(innovations, variances, strict=True)]
-    record = f.observations.mag
-    record.record(f.t_now, innovations, variances, max(ratios))
+        innovations, z = (*innovations[0:2], 0.0), 0.0
     f.observations.yaw.test_ratio = 0.0
     rejections = f.rejections
-    rejections.mag_x, rejections.mag_y, rejections.mag_z = (ratio > 1.0 for ratio in ratios)
+    rejections.mag_x, rejections.mag_y, rejections.mag_z = x > 1.0, y > 1.0, z > 1.0
     rejections.mag_judged_after_height = True
-    if record.test_ratio > 1.0:
-        record.reject()
+    record = f.observations.mag
+    if not record.judge(f.t_now, innovations, variances, max(x, y, z)):
+        faults.mag_x = faults.mag_y = faults.mag_z = False
         return False
-    record.accept()
     variance = np.array(variances)
     outcome = f.cov.fuse_field(f.x, innovation, 2 if f.flags.synthetic_mag_z else 3, noise,
                                all_states, table_declination(f), shortest_field(f), variance)
-    faults.mag_x, faults.mag_y, faults.mag_z = (code != 0 for code in outcome)
+    first, second, third = outcome
+    faults.mag_x, faults.mag_y, faults.mag_z = first != 0, second != 0, third != 0
     if VARIANCE_TOO_SMALL in outcome:
         _restart_field_covariance(f)
     record.variance[:] = variance.tolist()
