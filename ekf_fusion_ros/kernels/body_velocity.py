@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.kernels.compile import kernel
-from ekf_fusion_ros.kernels.compile import three
 from ekf_fusion_ros.kernels.update import apply_update
 from ekf_fusion_ros.kernels.update import test_ratio
 
@@ -84,4 +83,5 @@ def fuse_body_velocity(
         spread = _project_rows(p, jacobian, axis, hp) + noise[axis]
         if not apply_update(p, x, hp / spread, hp, body[axis] - measured[axis], limits):
             faults += 1 << axis
-    return three(innovation), three(variance), three(ratio), faults
+    return ((innovation[0], innovation[1], innovation[2]),
+            (variance[0], variance[1], variance[2]), (ratio[0], ratio[1], ratio[2]), faults)

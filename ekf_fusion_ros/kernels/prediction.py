@@ -51,9 +51,9 @@ PROCESS = np.dtype([
     ('peak_limits', 'f8', (2,)), ('peak_decay', 'f8')])
 """What the prediction keeps and is told: scratch for F, noise of the increments in rad^2 and
 (m/s)^2, additive noise of the states, the low-passed height rate in m/s, sigma of the wind and
-drift variances per period, the leaky sum of predict_state, the predicted displacement NE in m since
-it was last asked for; the largest accelerometer bias in m/s^2, variances of frozen ones, and peaks
-of rate in rad/s and specific force in m/s^2, above whose limits none is learned, with the factor
+drift variances per period, the leaky sum of predict_state, the predicted displacement NE in m
+since it was last asked for; the largest accelerometer bias in m/s^2, variances of frozen ones, and
+peaks of rate in rad/s and specific force in m/s^2, above whose limits none is learned, with the factor
 per period by which they fall."""
 
 

@@ -16,7 +16,6 @@ from oracles import quaternions
 from oracles import sandwich
 from oracles import seeds
 from oracles import to_scipy
-from oracles import vectors
 import pytest
 
 from ekf_fusion_ros.ekf2.aid_sources.magnetic_fusion import fuse_declination
