@@ -53,8 +53,8 @@ PROCESS = np.dtype([
 (m/s)^2, additive noise of the states, the low-passed height rate in m/s, sigma of the wind and
 drift variances per period, the leaky sum of predict_state, the predicted displacement NE in m
 since it was last asked for; the largest accelerometer bias in m/s^2, variances of frozen ones, and
-peaks of rate in rad/s and specific force in m/s^2, above whose limits none is learned, with the factor
-per period by which they fall."""
+peaks of rate in rad/s and specific force in m/s^2, above whose limits none is learned, with the
+factor per period by which they fall."""
 
 
 STATE_LIMITS = np.repeat(
