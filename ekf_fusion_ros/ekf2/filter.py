@@ -143,6 +143,7 @@ class Filter:
         self.wind_dead_reckoning = False
         self.last_aiding_us = 0
         self.yaw_reset_requested = False
+        self.north_wanted_us = 0
 
     def late(self, stamp_us: int, timeout_us: int) -> bool:
         """True when more than a timeout has passed since a stamp."""

@@ -165,7 +165,11 @@ class VisionParams:
 class MagParams:
     """Magnetometer."""
 
-    type: str = param('auto', 'How the magnetometer is used.', choices=MAG_TYPES)
+    type: str = param(
+        'auto', 'How the magnetometer is used. auto: heading on the ground and in steady flight, '
+        'three axes in flight where motion makes them observable; heading or three_axis: always '
+        'this; vtol: as auto, but while airspeed is fused only the field states are corrected; '
+        'indoor: as auto, but only while fixes or odometry aid; none: never.', choices=MAG_TYPES)
     delay_ms: float = param(0.0, 'Delay against the IMU.', unit='ms', min=0, max=300,
                             px4='EKF2_MAG_DELAY', ecl='mag_delay_ms')
     heading_noise: float = param(0.3, 'Noise of the magnetic heading.', unit='rad', min=0.01,
@@ -192,7 +196,15 @@ class MagParams:
                                  unit='rad/s', min=0, max=5, px4='EKF2_MAG_YAWLIM',
                                  ecl='mag_yaw_rate_gate')
     synthesize_z: bool = param(False, 'Replace the z axis by the one the field table gives.')
-    check_strength: bool = param(False, 'Stop using a field of implausible strength.')
+    check_strength: bool = param(False, 'Do not use a field of implausible strength.')
+    strength_tolerance: float = param(
+        0.2, 'Plausible deviation of the strength from that of the field model.', unit='G',
+        min=0.01, max=1.0, px4='EKF2_MAG_CHK_STR')
+    check_inclination: bool = param(
+        False, 'Do not use a field of implausible inclination at the attitude of the filter.')
+    inclination_tolerance: float = param(
+        20.0, 'Plausible deviation of the inclination from that of the field model.', unit='deg',
+        min=0, max=90, px4='EKF2_MAG_CHK_INC')
     field_model: str = param('ecl_table', 'Source of declination, inclination and strength.',
                              choices=('ecl_table', 'wmm'))
 

@@ -33,6 +33,9 @@ GPS_CONTROL_BITS = (
     'ekf2.gnss.enabled', 'GNSS height beside the height reference',
     'GNSS velocity, which goes with position here', 'ekf2.gnss.yaw',
 )
+# Bit 0 is all that the boolean of July 2021 had.
+MAG_CHECK_BITS = ('ekf2.mag.check_strength', 'ekf2.mag.check_inclination',
+                  'waiting for the field model')
 TERRAIN_BITS = ('ekf2.terrain.use_range', 'ekf2.terrain.use_flow')
 EV_CONTROL_BITS = (
     'ekf2.vision.use_position', 'vision height beside the height reference',
@@ -46,6 +49,7 @@ BIT_MASKS = {
     'EKF2_GPS_CHECK': CHECK_BITS,
     'mag_declination_source': DECLINATION_BITS,
     'EKF2_DECL_TYPE': DECLINATION_BITS,
+    'EKF2_MAG_CHECK': MAG_CHECK_BITS,
     'terrain_fusion_mode': TERRAIN_BITS,
     'EKF2_TERR_MASK': TERRAIN_BITS,
     'EKF2_EV_CTRL': EV_CONTROL_BITS,
@@ -60,7 +64,6 @@ ENUMERATIONS = {
 }
 SWITCHES = {
     'check_mag_strength': 'ekf2.mag.check_strength',
-    'EKF2_MAG_CHECK': 'ekf2.mag.check_strength',
     'synthesize_mag_z': 'ekf2.mag.synthesize_z',
     'EKF2_SYNT_MAG_Z': 'ekf2.mag.synthesize_z',
     'range_aid': 'ekf2.range.aid',

@@ -103,6 +103,13 @@ def test_modern_gnss_control_bits() -> None:
                       'EKF2_GPS_CTRL bit 2 (GNSS velocity, which goes with position here)']
 
 
+def test_magnetic_check_bits() -> None:
+    values, unused = translate({'EKF2_MAG_CHECK': 7, 'EKF2_MAG_CHK_INC': 15.0}, Ekf2Params())
+    assert values == {'ekf2.mag.check_strength': True, 'ekf2.mag.check_inclination': True,
+                      'ekf2.mag.inclination_tolerance': 15.0}
+    assert unused == ['EKF2_MAG_CHECK bit 2 (waiting for the field model)']
+
+
 def test_names_outside_of_the_estimator() -> None:
     values, unused = translate({'EKF2_EVP_NOISE': 0.2, 'EKF2_MIN_OBS_DT': 30.0}, Ekf2Params())
 

@@ -211,6 +211,7 @@ class Gnss:
         if flags.yaw_align and not flags.ev_yaw and not (has_compass and f.yaw_reset_requested):
             return True
         self.vision_yaw_forbidden = True
+        f.north_wanted_us = f.t_now
         if flags.ev_yaw:
             # yaw of the odometry frame: its heading against north is not known
             flags.ev_yaw = False

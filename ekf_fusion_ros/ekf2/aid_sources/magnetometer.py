@@ -35,9 +35,6 @@ ANOMALY_HEIGHT = 1.5
 OBSERVABLE_MEMORY_US = 2 * SECOND
 FIELD_SETTLING_US = 5 * SECOND
 INHIBITED_TOO_LONG_US = 5 * SECOND
-STRENGTH_TOLERANCE = 0.2
-"""Plausible deviation in Gauss from the strength of the field model."""
-
 STRENGTH_ON_EARTH = 0.45
 STRENGTH_RANGE = 0.40
 """Middle and half width in Gauss of what is found on the earth."""
@@ -80,7 +77,12 @@ class Magnetometer:
     @property
     def usable(self) -> bool:
         """True where the parameters allow the magnetometer to set the heading at start."""
-        return self._f.params.mag.type in ('auto', 'heading', 'three_axis')
+        return self._f.params.mag.type in ('auto', 'heading', 'three_axis', 'vtol')
+
+    @property
+    def _only_learns_field(self) -> bool:
+        """True where motors of forward flight may disturb it: only field states are corrected."""
+        return self._f.params.mag.type == 'vtol' and self._f.flags.fuse_aspd
 
     def push(self, sample: MagSample, min_interval_us: int) -> None:
         """Average a raw sample in, and queue the mean when the interval has passed."""
@@ -115,8 +117,8 @@ class Magnetometer:
         """Run once per filter period."""
         f = self._f
         flags = f.flags
-        if f.params.mag.check_strength:
-            flags.mag_disturbed = self._strength_implausible()
+        if f.params.mag.check_strength or f.params.mag.check_inclination:
+            flags.mag_disturbed = self._field_implausible()
         if not flags.in_air:
             flags.mag_aligned_in_flight = False
             self._course.land()
@@ -148,12 +150,27 @@ class Magnetometer:
         unaided = when == 'unaided' and not motion_tells_yaw
         return when == 'always' or unaided or not flags.yaw_align
 
+    def _field_implausible(self) -> bool:
+        """Compare the newest field with the model, or with what is found on earth without one."""
+        mag = self._f.params.mag
+        return ((mag.check_strength and self._strength_implausible())
+                or (mag.check_inclination and self._inclination_implausible()))
+
     def _strength_implausible(self) -> bool:
         strength = float(np.linalg.norm(self.field))
         field = self._f.earth.field
         if self._f.earth.has_origin and field is not None:
-            return abs(strength - field.strength) > STRENGTH_TOLERANCE
+            return abs(strength - field.strength) > self._f.params.mag.strength_tolerance
         return abs(strength - STRENGTH_ON_EARTH) > STRENGTH_RANGE
+
+    def _inclination_implausible(self) -> bool:
+        field = self._f.earth.field
+        if field is None or not self.count:
+            return False
+        north, east, down = (self._f.rot @ self.field).tolist()
+        inclination = math.atan2(down, math.hypot(north, east))
+        tolerance = math.radians(self._f.params.mag.inclination_tolerance)
+        return abs(inclination - field.inclination) > tolerance
 
     def stop(self) -> None:
         """Stop heading and 3-axis fusion."""
@@ -172,7 +189,8 @@ class Magnetometer:
         kind = self._f.params.mag.type
         three_axes = kind == 'three_axis'
         if kind in ('auto', 'vtol'):
-            three_axes = self._field_is_observable()
+            # a heading would correct the attitude
+            three_axes = self._field_is_observable() or self._only_learns_field
         self._use_three_axes(three_axes)
         self._f.flags.mag_hdg = not three_axes
 
@@ -232,7 +250,7 @@ class Magnetometer:
         f = self._f
         if self.aligned_us == f.t_horizon and not initial:
             return True
-        if f.params.mag.type == 'indoor':
+        if f.params.mag.type == 'indoor' and not self._fixes_wait_for_north():
             return True
         if f.params.mag.type == 'none':
             return False
@@ -248,10 +266,9 @@ class Magnetometer:
     def _fuse(self) -> None:
         f = self._f
         flags = f.flags
-        flags.mag_dec = flags.mag_3d and (not flags.gps or f.params.mag.declination_always)
-        earth_aided = flags.gps or flags.ev_pos or flags.ev_vel
-        indoors = f.params.mag.type == 'indoor' and not earth_aided
-        self._inhibited = indoors or flags.mag_disturbed
+        flags.mag_dec = (flags.mag_3d and (not flags.gps or f.params.mag.declination_always)
+                         and not self._only_learns_field)
+        self._inhibited = self._is_indoors() or flags.mag_disturbed
         if not self._inhibited:
             self._not_inhibited_us = f.t_horizon
         if f.t_horizon - self._not_inhibited_us > INHIBITED_TOO_LONG_US:
@@ -261,9 +278,26 @@ class Magnetometer:
         elif flags.mag_hdg:
             self._fuse_heading()
 
+    def _is_indoors(self) -> bool:
+        """Take a vehicle of that type to be indoors where nothing needs or tells north."""
+        flags = self._f.flags
+        aided = flags.gps or flags.ev_pos or flags.ev_vel
+        unaided = self._f.params.mag.type == 'indoor' and not aided
+        return unaided and not self._fixes_wait_for_north()
+
+    def _fixes_wait_for_north(self) -> bool:
+        """Return whether nothing but yaw keeps good fixes from aiding, and they alone would.
+
+        The reference inhibits the field until they aid, which then never happens.
+        """
+        f = self._f
+        aided = f.flags.gps or f.flags.ev_pos or f.flags.ev_vel
+        return f.recent(f.north_wanted_us, SECOND) and not aided
+
     def _fuse_three_axes(self) -> None:
         f = self._f
-        all_states = f.t_horizon - self.aligned_us > FIELD_SETTLING_US
+        settled = f.t_horizon - self.aligned_us > FIELD_SETTLING_US
+        all_states = settled and not self._only_learns_field
         if not self._declination_done:
             # the field direction is taken from the model first, so that yaw does not move
             fuse_declination(f, DECLINATION_SIGMA_AT_START)
