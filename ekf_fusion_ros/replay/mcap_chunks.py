@@ -12,6 +12,7 @@ import mmap
 from operator import itemgetter
 from pathlib import Path
 import struct
+from typing import BinaryIO
 import zlib
 
 from ekf_fusion_ros.replay.compression import zstd
@@ -20,6 +21,7 @@ MESSAGE, CHUNK_INDEX = 5, 8
 FOOTER_SIZE = 37
 _HEAD = struct.Struct('<BQ').unpack_from
 _MESSAGE = struct.Struct('<H4xQ').unpack_from
+_SIZES, _STORED = struct.Struct('<QII'), struct.Struct('<Q')
 
 
 def chunks_in_order(path: Path) -> list[int]:
@@ -40,9 +42,10 @@ def chunk_messages(
 
     Raises ValueError, struct.error or an error of the decompressor for a damaged chunk.
     """
-    with path.open('rb') as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+    # Read, not mapped: mapped pages would count as memory of the process until the end.
+    with path.open('rb') as stream:
         for offset in chunks:
-            yield from sorted(_messages(_records(data, offset), topics), key=itemgetter(0))
+            yield from sorted(_messages(_records(stream, offset), topics), key=itemgetter(0))
 
 
 def _index(data: mmap.mmap) -> Iterator[tuple[int, int, int]]:
@@ -55,13 +58,13 @@ def _index(data: mmap.mmap) -> Iterator[tuple[int, int, int]]:
         at += 9 + length
 
 
-def _records(data: mmap.mmap, offset: int) -> bytes:
+def _records(stream: BinaryIO, offset: int) -> bytes:
     """Return the records of a chunk, decompressed and checked."""
-    size, crc, name_length = struct.unpack_from('<QII', data, offset + 9 + 16)
-    at = offset + 9 + 32 + name_length
-    compression = data[at - name_length:at].decode()
-    stored, = struct.unpack_from('<Q', data, at)
-    raw = _decompressed(compression, data[at + 8:at + 8 + stored])
+    stream.seek(offset + 9 + 16)
+    size, crc, name_length = _SIZES.unpack(stream.read(_SIZES.size))
+    compression = stream.read(name_length).decode()
+    stored, = _STORED.unpack(stream.read(_STORED.size))
+    raw = _decompressed(compression, stream.read(stored))
     if len(raw) != size:
         raise ValueError(f'a chunk holds {len(raw)} bytes instead of {size}')
     if crc and zlib.crc32(raw) != crc:
