@@ -27,11 +27,11 @@ RECOVERED_PERCENT = 99
 
 def minimum_rates(params: Ekf2Params, roles: frozenset[str]) -> dict[str, int]:
     """Return the least rate in Hz of each role in use that has one."""
-    wanted = {
-        ROLE_OF_HEIGHT[params.height.reference]: AIDING_MINIMUM,
-        MAGNETIC_FIELD: AIDING_MINIMUM,
-        IMU: IMU_MINIMUM,
-    }
+    wanted = {MAGNETIC_FIELD: AIDING_MINIMUM, IMU: IMU_MINIMUM}
+    height = ROLE_OF_HEIGHT[params.height.reference]
+    # Two topics: odometry carries the height from fix to fix, however rare they are.
+    if height != FIX or IMU in roles:
+        wanted[height] = AIDING_MINIMUM
     return {role: rate for role, rate in wanted.items() if role in roles}
 
 

@@ -78,6 +78,13 @@ def test_odometry_as_inertial_input_may_be_slower_than_an_imu(drive):
     assert flight.run(20.0, odometry=20, fix=5) == []
 
 
+def test_odometry_carries_the_height_between_rare_fixes(drive):
+    flight = drive('odometry', 'fix')
+    assert flight.run(60.0, odometry=10, fix=1) == []
+    assert flight.session.health().level == HealthLevel.OK
+    assert not any(name.startswith('rate.fix') for name in flight.session.health().values)
+
+
 def test_without_pressure_the_fixes_are_the_height(drive):
     flight = drive('imu', 'fix')
     assert flight.run(20.0, imu=100, fix=2) == [
