@@ -20,6 +20,9 @@ from ekf_fusion_ros.statistics import RoleStatistics
 if TYPE_CHECKING:
     from ekf_fusion_ros.params.session import SessionParams
 
+RELEASE_US = 20_000
+"""Time that the way of a fix from here to the filter may take, two of its periods."""
+
 JOINS: dict[str, Callable[..., GnssSample]] = {
     FIX_VELOCITY: with_velocity, GPS_HEADING: with_heading}
 
@@ -32,11 +35,14 @@ class FixAssembly:
 
     def __init__(
         self, statistics: Mapping[str, RoleStatistics], roles: Collection[str],
-        params: SessionParams,
+        params: SessionParams, age_limit_us: int,
     ) -> None:
-        """Pair with the topics in `roles`; `statistics` counts what stays alone."""
+        """Pair with the topics in `roles`; `statistics` counts what stays alone.
+
+        No fix waits until it is older than age_limit_us: the filter could not take it any more.
+        """
         tolerance_us = round(1e6 * params.pairing_tolerance)
-        wait_us = round(1e6 * params.pairing_wait)
+        wait_us = min(round(1e6 * params.pairing_wait), age_limit_us - RELEASE_US)
         self._stages = [role for role in JOINS if role in roles]
         self._pairings = [FixPairing(statistics[role], tolerance_us, wait_us, JOINS[role])
                           for role in self._stages]

@@ -116,7 +116,8 @@ class FusionSession:
         self._heading = OdometryHeading()
         self._holding = Holding(round(1000 * session.hold_ms))
         self._completion = Completion(self.params.messages)
-        self._assembly = FixAssembly(self._statistics, roles, session)
+        self._assembly = FixAssembly(
+            self._statistics, roles, session, age_limit_us(self.params, FIX))
         self._inertial = InertialInput(self.params, self._inertial_role) if roles else None
         self._motion = make_motion_heading(self.params, roles)
 

@@ -44,5 +44,6 @@ class SessionParams:
         0.05, 'Largest difference of stamps of a fix and the velocity that belongs to it.',
         unit='s', min=0, max=1)
     pairing_wait: float = param(
-        0.2, 'Time by inertial stamps that a fix waits for its velocity.', unit='s', min=0,
+        0.2, 'Time by inertial stamps that a fix waits for its velocity or heading; less where '
+        'the fusion horizon could not take it any more.', unit='s', min=0,
         max=2)
