@@ -10,6 +10,7 @@ from typing import Any
 
 from ekf_fusion_ros.estimator import Estimator
 from ekf_fusion_ros.messages.decode_airspeed import decode_airspeed
+from ekf_fusion_ros.messages.decode_aux_velocity import decode_aux_velocity
 from ekf_fusion_ros.messages.decode_fix import decode_fix
 from ekf_fusion_ros.messages.decode_fix import decode_fix_velocity
 from ekf_fusion_ros.messages.decode_flow import decode_flow
@@ -22,6 +23,7 @@ from ekf_fusion_ros.messages.decode_odometry import decode_odometry
 from ekf_fusion_ros.messages.decode_pressure import decode_pressure
 from ekf_fusion_ros.messages.decode_range import decode_range
 from ekf_fusion_ros.roles import AIRSPEED
+from ekf_fusion_ros.roles import AUX_VELOCITY
 from ekf_fusion_ros.roles import FIX
 from ekf_fusion_ros.roles import FIX_VELOCITY
 from ekf_fusion_ros.roles import FLOW
@@ -59,6 +61,7 @@ DECODERS: dict[str, Callable[..., Any]] = {
     AIRSPEED: decode_airspeed,
     LANDED: decode_landed,
     GPS_HEADING: decode_gps_heading,
+    AUX_VELOCITY: decode_aux_velocity,
 }
 
 ROLE_OF_SAMPLE: dict[type, str] = {
@@ -70,7 +73,7 @@ ROLE_OF_SAMPLE: dict[type, str] = {
     RangeSample: RANGE,
     FlowSample: FLOW,
     AirspeedSample: AIRSPEED,
-    AuxVelocitySample: 'aux_velocity',
+    AuxVelocitySample: AUX_VELOCITY,
     LandedSample: LANDED,
     HeadingSample: 'heading',
 }

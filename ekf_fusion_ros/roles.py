@@ -25,10 +25,11 @@ FLOW = 'flow'
 AIRSPEED = 'airspeed'
 LANDED = 'landed'
 GPS_HEADING = 'gps_heading'
+AUX_VELOCITY = 'aux_velocity'
 
 SUPPORTED = (
     ODOMETRY, FIX, FIX_VELOCITY, IMU, MAGNETIC_FIELD, PRESSURE, RANGE, FLOW, AIRSPEED, LANDED,
-    GPS_HEADING)
+    GPS_HEADING, AUX_VELOCITY)
 PARTS_OF_FIX = (FIX_VELOCITY, GPS_HEADING)
 """Roles whose messages belong to the fix of the same stamp."""
 
@@ -41,6 +42,7 @@ DELAYS = {
     RANGE: ('range', 'delay_ms'),
     FLOW: ('flow', 'delay_ms'),
     AIRSPEED: ('aiding', 'airspeed_delay_ms'),
+    AUX_VELOCITY: ('aiding', 'auxvel_delay_ms'),
 }
 
 

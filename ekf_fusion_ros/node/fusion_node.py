@@ -60,6 +60,7 @@ TOPICS = {
     'airspeed': ('airspeed', TwistWithCovarianceStamped),
     'landed': ('landed', Bool),
     'gps_heading': ('gps_heading', PoseWithCovarianceStamped),
+    'aux_velocity': ('aux_velocity', TwistWithCovarianceStamped),
 }
 # Messages other than the usual ones, by the word in node.<role>_type.
 OTHER_TYPES = {'twist': TwistStamped, 'pose': PoseStamped, 'imu': Imu}

@@ -194,6 +194,17 @@ class GpsHeadingMessageParams:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class AuxVelocityMessageParams:
+    """Velocity against a target at rest, as of a landing beacon."""
+
+    default_noise: float = param(
+        0.1, 'Velocity noise where the covariance is zero or absent.', unit='m/s', min=0.001,
+        max=100)
+    min_noise: float = param(
+        0.01, 'Smallest velocity noise that is believed.', unit='m/s', min=1e-4, max=100)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MessageParams:
     """What the messages of each role mean; the groups bear the names of the roles."""
 
@@ -209,3 +220,4 @@ class MessageParams:
     airspeed: AirspeedMessageParams = field(default_factory=AirspeedMessageParams)
     landed: LandedMessageParams = field(default_factory=LandedMessageParams)
     gps_heading: GpsHeadingMessageParams = field(default_factory=GpsHeadingMessageParams)
+    aux_velocity: AuxVelocityMessageParams = field(default_factory=AuxVelocityMessageParams)

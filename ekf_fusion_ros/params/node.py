@@ -40,6 +40,11 @@ class NodeParams:
     gps_heading_type: str = param(
         'pose_with_covariance', 'Message of `gps_heading`: PoseWithCovarianceStamped, '
         'PoseStamped or Imu.', choices=HEADING_TYPES)
+    use_aux_velocity: bool = param(
+        False, 'Subscribe to `aux_velocity` (velocity against a target at rest, ENU).')
+    aux_velocity_type: str = param(
+        'twist_with_covariance', 'Message of `aux_velocity`: TwistWithCovarianceStamped or '
+        'TwistStamped.', choices=TWIST_TYPES)
     core_rate: float = param(
         100.0, 'Rate of the timer that runs the filter on the queued messages.', unit='Hz',
         min=1, max=1000)

@@ -23,6 +23,7 @@ from ekf_fusion_ros.frames import swap_yaw_enu_ned
 from ekf_fusion_ros.geo.atmosphere import pressure_at
 from ekf_fusion_ros.messages.stamps import seconds_nanoseconds
 from ekf_fusion_ros.samples import AirspeedSample
+from ekf_fusion_ros.samples import AuxVelocitySample
 from ekf_fusion_ros.samples import BaroSample
 from ekf_fusion_ros.samples import FlowSample
 from ekf_fusion_ros.samples import GnssSample
@@ -78,6 +79,7 @@ class _Messages:
             FlowSample: ('/flow', self._flow),
             AirspeedSample: ('/airspeed', self._airspeed),
             LandedSample: ('/landed', self._landed),
+            AuxVelocitySample: ('/aux_velocity', self._aux_velocity),
         }
 
     def of(self, sample: Sample) -> Iterator[tuple[str, Any]]:
@@ -209,6 +211,13 @@ class _Messages:
             'geometry_msgs/TwistWithCovarianceStamped',
             header=self._header(sample.time_us, 'base_link'),
             twist=self._twist(speed, np.diag((0.0, UNMEASURED, UNMEASURED))))
+
+    def _aux_velocity(self, sample: AuxVelocitySample) -> Any:
+        variance = np.abs(swap_enu_ned(sample.variance))
+        return self._make(
+            'geometry_msgs/TwistWithCovarianceStamped',
+            header=self._header(sample.time_us, 'base_link'),
+            twist=self._twist(swap_enu_ned(sample.velocity), np.diag(variance)))
 
     def _landed(self, sample: LandedSample) -> Any:
         return self._make('std_msgs/Bool', data=sample.landed)

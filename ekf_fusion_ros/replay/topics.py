@@ -27,6 +27,8 @@ TYPES: dict[str, tuple[str, ...]] = {
     roles.GPS_HEADING: (
         'geometry_msgs/msg/PoseWithCovarianceStamped', 'geometry_msgs/msg/PoseStamped',
         'sensor_msgs/msg/Imu'),
+    roles.AUX_VELOCITY: (
+        'geometry_msgs/msg/TwistWithCovarianceStamped', 'geometry_msgs/msg/TwistStamped'),
 }
 ALL_TYPES = frozenset(kind for kinds in TYPES.values() for kind in kinds)
 WITH_ODOMETRY = (roles.ODOMETRY, roles.FIX)
@@ -39,6 +41,7 @@ NAMES = {
     roles.AIRSPEED: ('airspeed', 'air_speed', 'pitot'),
     roles.LANDED: ('landed', 'on_ground', 'ground_contact'),
     roles.GPS_HEADING: ('heading',),
+    roles.AUX_VELOCITY: ('aux_velocity', 'landing_target', 'target_velocity'),
 }
 # Outputs of a fusion, this one's among them, are not its inputs.
 OUTPUT_NAMES = ('odometry/filtered', 'odometry/gps', 'gps/filtered')

@@ -15,6 +15,7 @@ from ekf_fusion_ros.geo.magnetic_field import EclFieldTable
 from ekf_fusion_ros.samples import ImuSample
 from ekf_fusion_ros.samples import Sample
 from ekf_fusion_ros.simulation.airspeed import Airspeed
+from ekf_fusion_ros.simulation.auxiliary_velocity import AuxiliaryVelocity
 from ekf_fusion_ros.simulation.barometer import Barometer
 from ekf_fusion_ros.simulation.dual_antenna import DualAntennaGnss
 from ekf_fusion_ros.simulation.gnss import Gnss
@@ -32,7 +33,7 @@ from ekf_fusion_ros.simulation.vision import Vision
 ORIGIN = GeoPoint(47.397742, 8.545594, 488.0)
 START_US = 1_700_000_000_000_000
 ROLES = ('odometry', 'fix', 'imu', 'magnetic_field', 'pressure')
-FURTHER_ROLES = ('range', 'flow', 'airspeed', 'landed')
+FURTHER_ROLES = ('range', 'flow', 'airspeed', 'landed', 'aux_velocity')
 GPS_HEADING = 'gps_heading'
 """No sensor of its own: a receiver with two antennas tells it with the fix."""
 
@@ -99,6 +100,7 @@ def default_sensors(
         'flow': OpticalFlow(),
         'airspeed': Airspeed(reference=origin.alt),
         'landed': GroundContact(),
+        'aux_velocity': AuxiliaryVelocity(),
     }
     return {role: everything[role] for role in roles if role != GPS_HEADING}
 

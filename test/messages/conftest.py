@@ -87,6 +87,12 @@ class Build:
         message.twist.twist.linear = self.vector(speed)
         return message
 
+    def aux_velocity(self, east=3.0, north=2.0, up=-0.5, frame_id='map'):
+        message = self.fix_velocity(frame_id=frame_id)
+        message.twist.twist.linear = self.vector(east, north, up)
+        message.twist.covariance = diagonal((0.01, 0.04, 0.09, 1e6, 1e6, 1e6))
+        return message
+
     def gps_heading(self, yaw=0.25, variance=1e-4):
         pose = SimpleNamespace(
             position=self.vector(),

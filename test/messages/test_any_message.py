@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from ekf_fusion_ros.messages.decode_airspeed import decode_airspeed
+from ekf_fusion_ros.messages.decode_aux_velocity import decode_aux_velocity
 from ekf_fusion_ros.messages.decode_fix import decode_fix
 from ekf_fusion_ros.messages.decode_fix import decode_fix_velocity
 from ekf_fusion_ros.messages.decode_flow import decode_flow
@@ -28,7 +29,7 @@ DECODERS = {
     'odometry': decode_odometry, 'fix': decode_fix, 'fix_velocity': decode_fix_velocity,
     'imu': decode_imu, 'magnetic_field': decode_magnetic_field, 'pressure': decode_pressure,
     'range': decode_range, 'flow': decode_flow, 'airspeed': decode_airspeed,
-    'gps_heading': decode_gps_heading,
+    'gps_heading': decode_gps_heading, 'aux_velocity': decode_aux_velocity,
 }
 
 nasty = st.one_of(
@@ -87,6 +88,8 @@ def test_spoiled_messages_are_refused_or_sane(build, role, data):
     ('geometry_msgs.msg', 'Vector3Stamped', 'flow'),
     ('geometry_msgs.msg', 'TwistStamped', 'airspeed'),
     ('geometry_msgs.msg', 'TwistWithCovarianceStamped', 'airspeed'),
+    ('geometry_msgs.msg', 'TwistStamped', 'aux_velocity'),
+    ('geometry_msgs.msg', 'TwistWithCovarianceStamped', 'aux_velocity'),
     ('geometry_msgs.msg', 'PoseStamped', 'gps_heading'),
     ('geometry_msgs.msg', 'PoseWithCovarianceStamped', 'gps_heading'),
     ('sensor_msgs.msg', 'Imu', 'gps_heading'),

@@ -60,6 +60,7 @@ INPUTS = {
     'airspeed': ('airspeed', TwistWithCovarianceStamped),
     'landed': ('landed', Bool),
     'gps_heading': ('gps_heading', PoseWithCovarianceStamped),
+    'aux_velocity': ('aux_velocity', TwistWithCovarianceStamped),
 }
 IN_FLIGHT = 300
 DEPTH = 10000
@@ -188,7 +189,7 @@ INERTIAL = {
 
 FURTHER = {
     'range': '/range', 'flow': '/flow', 'airspeed': '/airspeed', 'landed': '/landed',
-    'gps_heading': '/gps_heading'}
+    'gps_heading': '/gps_heading', 'aux_velocity': '/aux_velocity'}
 
 
 @pytest.mark.parametrize(

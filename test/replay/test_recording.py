@@ -48,7 +48,8 @@ def further(tmp_path_factory):
     """Scenario and recording of the further roles on an aeroplane."""
     from ekf_fusion_ros.replay.recording import write_recording
 
-    roles = ('fix', 'pressure', 'gps_heading', 'range', 'flow', 'airspeed', 'landed', 'imu')
+    roles = ('fix', 'pressure', 'gps_heading', 'range', 'flow', 'airspeed', 'landed',
+             'aux_velocity', 'imu')
     sensors = default_sensors(roles)
     sensors['fix'] = replace(sensors['fix'], heading_outages=((5.0, 10.0),), antenna_offset=0.4)
     sensors['range'] = replace(sensors['range'], dropout=0.1)
@@ -98,6 +99,16 @@ def test_flow_returns(further):
         assert number == 0 or got.dt == pytest.approx(sent.dt)
 
 
+def test_auxiliary_velocity_returns(further):
+    from ekf_fusion_ros.messages.decode_aux_velocity import decode_aux_velocity
+
+    for sent, message in pairs(further, 'aux_velocity', '/aux_velocity'):
+        got = decode_aux_velocity(message, MessageParams())
+        assert got.time_us == sent.time_us
+        np.testing.assert_allclose(got.velocity, sent.velocity, atol=1e-12)
+        np.testing.assert_allclose(got.variance, sent.variance, atol=1e-12)
+
+
 def test_airspeed_returns(further):
     from ekf_fusion_ros.messages.decode_airspeed import decode_airspeed
 
@@ -145,6 +156,7 @@ def test_replay_takes_in_all_further_roles(further, tmp_path):
                for sent, _ in pairs(further, 'airspeed', '/airspeed'))
     assert 0 < slow < 40
     assert counts['/airspeed'] == ('airspeed', 801, 801 - slow, {'below_threshold': slow})
+    assert counts['/aux_velocity'] == ('aux_velocity', 801, 801, {})
     assert counts['/gps_heading'] == ('gps_heading', 176, 176, {})
     assert counts['/landed'] == ('landed', 201, 151, {'withheld': 50})
 

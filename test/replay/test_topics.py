@@ -53,6 +53,7 @@ def test_asked_for_and_kept_out():
 FURTHER = recording(
     ('/imu', IMU, 900), ('/fix', FIX, 9), ('/lidar', RANGE, 90), ('/px4flow', VECTOR, 90),
     ('/wind', VECTOR, 900), ('/airspeed', TWIST, 90), ('/armed', BOOL, 9), ('/landed', BOOL, 9),
+    ('/landing_target/velocity', TWIST, 90),
     ('/gps/heading', POSE, 9), ('/goal_pose', POSE, 1))
 
 
@@ -61,7 +62,7 @@ def test_further_roles_stay_out_until_asked_for_and_it_is_said_how():
     assert names(choice) == {'imu': '/imu', 'fix': '/fix'}
     hints = [line.rsplit(' ', 1)[-1] for line in choice.remarks]
     assert hints == ['range=/lidar', 'flow=/px4flow', 'airspeed=/airspeed', 'landed=/landed',
-                     'gps_heading=/gps/heading']
+                     'aux_velocity=/landing_target/velocity', 'gps_heading=/gps/heading']
 
 
 def test_further_roles_by_name():
@@ -70,11 +71,12 @@ def test_further_roles_by_name():
 
 
 def test_further_roles_switched_on_by_parameters():
-    every = ('range', 'flow', 'airspeed', 'landed', 'gps_heading')
+    every = ('range', 'flow', 'airspeed', 'landed', 'gps_heading', 'aux_velocity')
     choice = topics.choose(FURTHER, {'landed': ''}, 'flight', every)
     assert names(choice) == {
         'imu': '/imu', 'fix': '/fix', 'range': '/lidar', 'flow': '/px4flow',
-        'airspeed': '/airspeed', 'gps_heading': '/gps/heading'}
+        'airspeed': '/airspeed', 'gps_heading': '/gps/heading',
+        'aux_velocity': '/landing_target/velocity'}
     assert 'left out as asked: /landed (std_msgs/msg/Bool)' in choice.remarks
     # The heading goes with the fix.
     assert 'gps_heading' not in names(topics.choose(FURTHER, {'fix': ''}, 'flight', every))

@@ -125,6 +125,9 @@ class Build:
         message.twist.twist.linear = self.vector(speed)
         return message
 
+    def aux_velocity(self, t, east=0.0):
+        return self.fix_velocity(t, east)
+
     @staticmethod
     def landed(landed=True):
         return SimpleNamespace(data=landed)

@@ -56,6 +56,16 @@ def test_range_and_flow_reach_the_estimator(build, estimator, fly):
     assert flows[1].flow == pytest.approx((0.05, 0.0))
 
 
+def test_auxiliary_velocity_reaches_the_estimator(build, estimator, fly):
+    session, run = fly('fix', 'aux_velocity')
+    run(0.0, 1.0)
+    session.handle('aux_velocity', build.aux_velocity(START + 1.0, east=3.0))
+    run(1.01, 1.1)
+    sample, = estimator.of(AuxVelocitySample)
+    assert sample.time_us == microseconds(1.0)
+    assert sample.velocity.tolist() == [2.0, 3.0, 0.0]
+
+
 def test_airspeed_takes_the_density_of_the_pressure(build, estimator, fly):
     session, run = fly('fix', 'pressure', 'airspeed')
     run(0.0, 1.0)

@@ -89,7 +89,7 @@ def test_height_without_pressure(roles, reference):
     assert configure(Params(), roles).ekf2.height.reference == reference
 
 
-@pytest.mark.parametrize('role', ['range', 'flow', 'airspeed', 'landed'])
+@pytest.mark.parametrize('role', ['range', 'flow', 'airspeed', 'landed', 'aux_velocity'])
 def test_each_further_role_joins_and_changes_nothing_of_the_others(role):
     plain = configure(Params(), ('imu', 'fix', 'pressure')).ekf2
     joined = configure(Params(), ('imu', 'fix', 'pressure', role)).ekf2
@@ -102,6 +102,7 @@ def test_parts_of_a_fix_may_be_as_late_as_pairing_allows():
     assert age_limit_us(params, 'gps_heading') == age_limit_us(params, 'fix_velocity') == 500_000
     # 200 ms of horizon and 100 ms beyond it, less 100 ms of delay and 20 ms of holding
     assert age_limit_us(params, 'airspeed') == 180_000
+    assert age_limit_us(params, 'aux_velocity') == age_limit_us(params, 'range') == 275_000
 
 
 def test_fix_older_than_the_horizon_can_take_is_refused():

@@ -27,10 +27,11 @@ def test_recording_and_truth_are_written(tmp_path, capsys):
 def test_further_sensors_and_wind(tmp_path, capsys):
     pytest.importorskip('rosbags')
     status = main([str(tmp_path / 'out'), '--trajectory', 'loiter', '--duration', '10', '--roles',
-                   'imu,fix,range,flow,airspeed,landed,gps_heading', '--wind', '3,-2'])
+                   'imu,fix,range,flow,airspeed,landed,gps_heading,aux_velocity',
+                   '--wind', '3,-2'])
     assert status == 0
     said = capsys.readouterr().out
-    for topic in ('/range', '/flow', '/airspeed', '/landed', '/gps_heading'):
+    for topic in ('/range', '/flow', '/airspeed', '/landed', '/gps_heading', '/aux_velocity'):
         assert topic in said
     with (tmp_path / 'out' / 'truth.csv').open() as stream:
         row = list(csv.DictReader(stream))[-1]

@@ -8,6 +8,7 @@ import pytest
 
 from ekf_fusion_ros.samples import LandedSample
 from ekf_fusion_ros.simulation.airspeed import Airspeed
+from ekf_fusion_ros.simulation.auxiliary_velocity import AuxiliaryVelocity
 from ekf_fusion_ros.simulation.dual_antenna import DualAntennaGnss
 from ekf_fusion_ros.simulation.gnss import Gnss
 from ekf_fusion_ros.simulation.ground_contact import GroundContact
@@ -292,9 +293,24 @@ def test_ground_contact_counts_from_the_terrain():
     assert all(s.landed for s in GroundContact(clearance=0.3).measure(hill, START, RNG(0)))
 
 
+# Auxiliary velocity.
+
+def test_a_beacon_tells_the_velocity_within_its_reach():
+    exact = AuxiliaryVelocity(vel_noise=0.0, reach=12.0).measure(EIGHT, START, RNG(0))
+    truth = EIGHT.motion(np.array([(s.time_us - START) * 1e-6 for s in exact]))
+    np.testing.assert_allclose([s.velocity for s in exact], truth.velocity, atol=1e-9)
+    assert (-truth.position[:, 2] <= 12.0).all()
+    everywhere = AuxiliaryVelocity(vel_noise=0.2).measure(EIGHT, START, RNG(0))
+    truth = EIGHT.motion(np.array([(s.time_us - START) * 1e-6 for s in everywhere]))
+    error = np.array([s.velocity for s in everywhere]) - truth.velocity
+    assert 0 < len(exact) < len(everywhere)
+    assert error.std(axis=0) == pytest.approx(3 * [0.2], rel=0.1)
+    assert everywhere[0].variance == pytest.approx(3 * [0.04])
+
+
 # All together.
 
-@pytest.mark.parametrize('sensor', [LIDAR, CAMERA, PITOT, GroundContact()])
+@pytest.mark.parametrize('sensor', [LIDAR, CAMERA, PITOT, GroundContact(), AuxiliaryVelocity()])
 def test_outages_and_delays(sensor):
     gap = replace(sensor, outages=((20.0, 30.0),), stamp_delay=0.05)
     whole = [s.time_us - START for s in sensor.measure(EIGHT, START, RNG(3))]
