@@ -19,7 +19,8 @@ def check_airspeed(airspeed: AirspeedReading | AirspeedSample, params: AidingPar
     threshold = params.airspeed_threshold
     if threshold <= 0.0:
         raise Refused('switched_off', 'ekf2.aiding.airspeed_threshold is 0: airspeed is not used')
-    speed = airspeed.speed if isinstance(airspeed, AirspeedReading) else airspeed.true_airspeed
+    speed = (airspeed.speed if isinstance(airspeed, AirspeedReading)
+             else airspeed.true_airspeed / airspeed.eas2tas)
     if speed <= threshold:
         raise Refused(BELOW_THRESHOLD, f'{speed:.1f} m/s is not above ekf2.aiding.'
                       f'airspeed_threshold, {threshold:g} m/s')

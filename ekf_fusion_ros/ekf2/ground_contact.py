@@ -31,7 +31,8 @@ class GroundContact:
         self._rest_down = 0.0
         vehicle = f.params.aiding.vehicle
         self._is_rover = vehicle == 'rover'
-        self._on_wings = self._zero_sideslip = f.flags.fixed_wing = vehicle == 'fixed_wing'
+        self._on_wings = f.flags.fixed_wing = vehicle == 'fixed_wing'
+        self._zero_sideslip = self._on_wings and f.params.air_data.use_sideslip
 
     def tell(self, sample: LandedSample) -> None:
         """Take a landed sample; it acts at once."""
@@ -39,7 +40,8 @@ class GroundContact:
             return
         self._told = True
         self._f.flags.fixed_wing = sample.fixed_wing or self._on_wings
-        self._zero_sideslip = sample.fuse_beta or self._on_wings
+        wanted = sample.fuse_beta or self._on_wings
+        self._zero_sideslip = wanted and self._f.params.air_data.use_sideslip
         self._set(not sample.landed)
 
     def step(self, quiet: bool) -> None:

@@ -342,6 +342,8 @@ class AirDataParams:
                                   ecl='eas_noise')
     airspeed_gate: float = param(5.0, 'Innovation gate of airspeed.', unit='sigma', min=1,
                                  max=100, px4='EKF2_TAS_GATE', ecl='tas_innov_gate')
+    use_sideslip: bool = param(
+        True, 'Take the sideslip of fixed wings in flight to be zero on average.')
     sideslip_noise: float = param(0.3, 'Noise of the assumption of zero sideslip.', unit='rad',
                                   min=0.01, max=1.0, px4='EKF2_BETA_NOISE', ecl='beta_noise')
     sideslip_gate: float = param(5.0, 'Innovation gate of sideslip.', unit='sigma', min=1,

@@ -68,6 +68,15 @@ SWITCHES = {
     'EKF2_SYNT_MAG_Z': 'ekf2.mag.synthesize_z',
     'range_aid': 'ekf2.range.aid',
     'EKF2_RNG_AID': 'ekf2.range.aid',
+    'EKF2_FUSE_BETA': 'ekf2.air_data.use_sideslip',
+}
+KIND_OF_VEHICLE = 'MAV_TYPE'
+"""The one parameter outside of EKF2 that its flight stack looks at: airspeed, wings, wheels."""
+
+# Of MAVLink's MAV_TYPE. A VTOL is none of these: it flies both ways.
+VEHICLES = {
+    1: 'fixed_wing', 2: 'multirotor', 3: 'multirotor', 4: 'multirotor', 10: 'rover',
+    13: 'multirotor', 14: 'multirotor', 15: 'multirotor', 29: 'multirotor', 35: 'multirotor',
 }
 MICROSECONDS = {
     'valid_timeout_max': 'ekf2.aiding.valid_timeout',
@@ -105,6 +114,8 @@ def translate(foreign: Mapping[str, Any], base: Ekf2Params) -> tuple[dict[str, A
             values[target] = _chosen(name, value, words)
         elif name in SWITCHES:
             values[SWITCHES[name]] = _whole(name, value) != 0
+        elif name == KIND_OF_VEHICLE:
+            _choose_vehicle(name, value, values, unused)
         elif name in MICROSECONDS:
             values[MICROSECONDS[name]] = _scalar(name, value) * 1e-6
         elif name[:-1] in AXES and name[-1] in 'XYZ':
@@ -156,6 +167,16 @@ def _chosen(name: str, value: Any, words: Sequence[str]) -> str:
     return words[index]
 
 
+def _choose_vehicle(
+    name: str, value: Any, values: dict[str, Any], unused: list[str],
+) -> None:
+    kind = _whole(name, value)
+    if kind in VEHICLES:
+        values['ekf2.aiding.vehicle'] = VEHICLES[kind]
+    else:
+        unused.append(f'{name} {kind} (no kind of vehicle that makes a difference)')
+
+
 def _scalar(name: str, value: Any) -> float:
     if isinstance(value, tuple) or not math.isfinite(value):
         raise ValueError(f'{name} = {value}: expected one finite number')
@@ -169,8 +190,13 @@ def _whole(name: str, value: Any) -> int:
     return int(number)
 
 
+def concerns_filter(name: str) -> bool:
+    """Return whether a PX4 parameter is one that `translate` knows about."""
+    return name.startswith('EKF2_') or name == KIND_OF_VEHICLE
+
+
 def read_px4(path: Path) -> tuple[dict[str, float], list[str]]:
-    """Return the EKF2 parameters of a PX4 .params file and what else it holds, in words.
+    """Return the EKF2 parameters and MAV_TYPE of a PX4 .params file and what else it holds, in words.
 
     Lines are `vehicle component NAME value type`, `#` starts a comment. Raises ValueError naming
     file and line.
@@ -181,7 +207,7 @@ def read_px4(path: Path) -> tuple[dict[str, float], list[str]]:
         fields = line.split()
         if len(fields) != 5:
             raise ValueError(f'{path} line {number}: expected "vehicle component NAME value type"')
-        if fields[2].startswith('EKF2_'):
+        if concerns_filter(fields[2]):
             values[fields[2]] = _number(path, number, fields[3])
         else:
             others += 1

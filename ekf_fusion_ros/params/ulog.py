@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from ekf_fusion_ros.params.px4 import concerns_filter
+
 MAGIC = b'ULog'
 
 
 def read_ulog(path: Path) -> tuple[dict[str, float], list[str]]:
-    """Return {EKF2 name: value at the start} of a ULog and what else it says, in words.
+    """Return {EKF2 name or MAV_TYPE: value at the start} of a ULog and what else it says, in words.
 
     Raises ValueError naming the file: no ULog, or the library pyulog is missing.
     """
@@ -26,7 +28,7 @@ def read_ulog(path: Path) -> tuple[dict[str, float], list[str]]:
     except Exception as error:  # damaged bytes can make the library raise anything
         raise ValueError(f'{path}: not a ULog file that can be read ({error})') from None
     values = {name: float(value) for name, value in log.initial_parameters.items()
-              if name.startswith('EKF2_')}
+              if concerns_filter(name)}
     others = len(log.initial_parameters) - len(values)
     remarks = [f'{others} parameters of other PX4 modules'] if others else []
     changed = {name for _, name, value in log.changed_parameters

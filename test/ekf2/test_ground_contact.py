@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from ekf_fusion_ros.params.ekf2 import AidingParams
+from ekf_fusion_ros.params.ekf2 import AirDataParams
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 from ekf_fusion_ros.samples import LandedSample
 
@@ -109,6 +110,14 @@ def test_sideslip_of_fixed_wings_only_counts_in_flight():
     assert {'in_air', 'fixed_wing', 'fuse_beta'} <= bench.flags
     bench.ekf.push(LandedSample(bench.now_us, landed=True))
     assert 'fixed_wing' in bench.flags and not {'in_air', 'fuse_beta'} & bench.flags
+
+
+def test_sideslip_of_fixed_wings_may_be_switched_off():
+    bench = Bench(Ekf2Params(aiding=AidingParams(vehicle='fixed_wing'),
+                             air_data=AirDataParams(use_sideslip=False)))
+    bench.fly(on_wings=True)
+    bench.run(0.1)
+    assert {'in_air', 'fixed_wing'} <= bench.flags and 'fuse_beta' not in bench.flags
 
 
 @pytest.mark.parametrize('vehicle', ['unspecified', 'multirotor', 'rover'])

@@ -110,6 +110,27 @@ def test_magnetic_check_bits() -> None:
     assert unused == ['EKF2_MAG_CHECK bit 2 (waiting for the field model)']
 
 
+@pytest.mark.parametrize(('number', 'vehicle'), [
+    (1, 'fixed_wing'), (2, 'multirotor'), (4, 'multirotor'), (10, 'rover'), (13, 'multirotor')])
+def test_kind_of_vehicle(tmp_path: Path, number: int, vehicle: str) -> None:
+    path = tmp_path / 'vehicle.params'
+    path.write_text(f'1\t1\tMAV_TYPE\t{number}\t6\n1\t1\tMAV_SYS_ID\t1\t6\n')
+    loaded = load_file(path)
+    assert loaded.params.ekf2.aiding.vehicle == vehicle
+    assert loaded.unused == ['1 parameters of other PX4 modules']
+
+
+def test_a_vtol_is_no_kind_of_its_own() -> None:
+    values, unused = translate({'MAV_TYPE': 22.0}, Ekf2Params())
+    assert values == {} and unused == ['MAV_TYPE 22 (no kind of vehicle that makes a difference)']
+
+
+@pytest.mark.parametrize('used', [True, False])
+def test_sideslip(used: bool) -> None:
+    assert translate({'EKF2_FUSE_BETA': float(used)}, Ekf2Params()) == (
+        {'ekf2.air_data.use_sideslip': used}, [])
+
+
 def test_names_outside_of_the_estimator() -> None:
     values, unused = translate({'EKF2_EVP_NOISE': 0.2, 'EKF2_MIN_OBS_DT': 30.0}, Ekf2Params())
 

@@ -88,7 +88,8 @@ def test_a_parameter_changed_in_flight_is_told(
     pyulog = pytest.importorskip('pyulog')
 
     log = SimpleNamespace(
-        initial_parameters={'EKF2_GPS_DELAY': 110.0, 'EKF2_GPS_P_NOISE': 0.5, 'MC_ROLL_P': 6.5},
+        initial_parameters={'EKF2_GPS_DELAY': 110.0, 'EKF2_GPS_P_NOISE': 0.5, 'MC_ROLL_P': 6.5,
+                            'MAV_TYPE': 1.0, 'EKF2_FUSE_BETA': 0.0},
         changed_parameters=[
             (5, 'EKF2_GPS_DELAY', 150.0), (6, 'MC_ROLL_P', 7.0), (7, 'EKF2_GPS_P_NOISE', 0.5)])
     monkeypatch.setattr(pyulog, 'ULog', lambda *_, **__: log)
@@ -96,6 +97,8 @@ def test_a_parameter_changed_in_flight_is_told(
     path.write_bytes(b'ULog\x01\x12\x35')
     loaded = load_file(path)
     assert loaded.params.ekf2.gnss.delay_ms == 110.0
+    assert loaded.params.ekf2.aiding.vehicle == 'fixed_wing'
+    assert not loaded.params.ekf2.air_data.use_sideslip
     assert loaded.unused == [
         '1 parameters of other PX4 modules', 'EKF2_GPS_DELAY as it was changed during the log']
 
