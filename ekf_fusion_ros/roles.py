@@ -129,7 +129,6 @@ def _add_odometry_as_imu(wanted: dict[str, dict[str, Any]]) -> None:
         'switch_on_gyro_bias': 0.001,
         'gyro_bias_process_noise': 1e-5,
     }
-    wanted['vision']['velocity_tells_attitude'] = True
     wanted['aiding'] = {'position_drift': 1.4, 'yaw_drift': 0.005, 'hold_yaw': 'never'}
     wanted['gnss']['correlation_time'] = 3.0
     wanted['gnss']['reset_at_start'] = False

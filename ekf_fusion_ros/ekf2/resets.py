@@ -155,7 +155,7 @@ class Resets:
             f.events.add(f.t_now, EventKind.VEL_RESET_VISION)
             turned, spread = vision_velocity_in_filter_frame(f, f.vision)
             velocity, variance = np.array(turned), np.array(spread)
-            if f.params.vision.velocity_tells_attitude:
+            if velocity_tells_attitude(f, f.vision):
                 # Its direction hangs on the attitude; the fusion that follows makes that known.
                 variance = variance + DIFFUSE * (1.0 + float(velocity @ velocity))
             self.horizontal_velocity(velocity, variance)
@@ -199,6 +199,15 @@ class Resets:
         assert f.fix is not None
         f.events.add(f.t_now, EventKind.POS_RESET_GPS)
         self.horizontal_position(f.fix.position, np.full(2, f.fix.hacc ** 2))
+
+
+def velocity_tells_attitude(f: Filter, sample: VisionSample) -> bool:
+    """Return whether a velocity is to be observed in the body, with which its frame turns."""
+    if not f.params.vision.velocity_tells_attitude:
+        return False
+    if sample.velocity_frame is VelocityFrame.BODY_FRD:
+        return True
+    return f.params.vision.rotate and not f.flags.ev_yaw and sample.has_attitude
 
 
 def vision_velocity_in_filter_frame(f: Filter, sample: VisionSample) -> tuple[Three, Three]:

@@ -19,7 +19,10 @@ Three = tuple[float, float, float]
 
 @kernel
 def body_velocity(q: Array, velocity: Array, body: Array, jacobian: Array) -> None:
-    """Fill body (3,) with R(q)' v and jacobian (3, 7) with its gradient by q and v (3,), m/s."""
+    """Fill body (3,) with R(q)' v and the first seven columns of jacobian with its gradient.
+
+    The gradient is by q and v (3,), m/s; jacobian has three rows.
+    """
     w, x, y, z = q[0], q[1], q[2], q[3]
     a, b, c = velocity[0], velocity[1], velocity[2]
     uv = x * a + y * b + z * c

@@ -148,8 +148,9 @@ class VisionParams:
     use_velocity: bool = param(False, 'Fuse velocity.')
     use_yaw: bool = param(False, 'Fuse yaw; only where the odometry frame is the earth frame.')
     velocity_tells_attitude: bool = param(
-        False, 'Observe a velocity of the body frame there, so that it corrects attitude; off, it '
-        'is turned by the attitude first.')
+        True, 'Observe a velocity that the body carries along (of the body frame, or of a rotated '
+        'odometry frame) in the body, so that it corrects attitude; off, it is turned by the '
+        'attitude first, and yaw runs away where nothing else measures it.')
     rotate: bool = param(False, 'Rotate the odometry frame into the filter frame.')
     delay_ms: float = param(175.0, 'Delay of the odometry against the IMU.', unit='ms', min=0,
                             max=1000, px4='EKF2_EV_DELAY', ecl='ev_delay_ms')

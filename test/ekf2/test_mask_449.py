@@ -19,6 +19,8 @@ from ekf_fusion_ros.params.ekf2 import GnssParams
 from ekf_fusion_ros.params.ekf2 import MagParams
 from ekf_fusion_ros.params.ekf2 import VisionParams
 from ekf_fusion_ros.samples import ImuSample
+from ekf_fusion_ros.samples import VelocityFrame
+from ekf_fusion_ros.samples import VisionSample
 from ekf_fusion_ros.simulation.barometer import Barometer
 from ekf_fusion_ros.simulation.dual_antenna import DualAntennaGnss
 from ekf_fusion_ros.simulation.ground_contact import GroundContact
@@ -49,8 +51,7 @@ SENSORS = {
 }
 PARAMS = Ekf2Params(
     gnss=GnssParams(yaw=True, delay_ms=0.0), mag=MagParams(type='none'),
-    vision=VisionParams(use_velocity=True, rotate=True, velocity_tells_attitude=True,
-                        delay_ms=0.0))
+    vision=VisionParams(use_velocity=True, rotate=True, delay_ms=0.0))
 
 
 @dataclass(frozen=True)
@@ -78,12 +79,12 @@ class Flown:
         return (self.time >= start) & (self.time < end)
 
 
-def fly(params=PARAMS, end=FLIGHT.duration):
-    """Run the filter, from the moment that it knows its origin."""
+def fly(params=PARAMS, end=FLIGHT.duration, seen=lambda sample: sample):
+    """Run the filter on samples as they are seen, from the moment that it knows its origin."""
     scenario = Scenario(trajectory=FLIGHT, sensors=SENSORS, seed=449)
     ekf, rows, count = Ekf2(params), [], 0
     for arrival in scenario.arrivals():
-        ekf.push(arrival.sample)
+        ekf.push(seen(arrival.sample))
         if not isinstance(arrival.sample, ImuSample):
             continue
         ekf.update()
@@ -204,3 +205,19 @@ def test_velocity_turned_by_the_attitude_first_makes_yaw_run_away():
     turned_first = replace(PARAMS.vision, velocity_tells_attitude=False)
     flown = fly(replace(PARAMS, vision=turned_first), end=33.0)
     assert np.degrees(np.abs(flown.yaw[-1])) > 5.0
+
+
+def in_odometry_frame(sample):
+    if not isinstance(sample, VisionSample):
+        return sample
+    turn = matrix_from_quat(sample.quaternion)
+    return replace(sample, velocity=turn @ sample.velocity, velocity_frame=VelocityFrame.LOCAL_FRD,
+                   velocity_cov=turn @ sample.velocity_cov @ turn.T)
+
+
+def test_velocity_of_the_rotated_odometry_frame_is_that_of_the_body(flown):
+    """Its frame hangs on the attitude just as the body does."""
+    turned = fly(end=33.0, seen=in_odometry_frame)
+    same = slice(len(turned.time))
+    np.testing.assert_allclose(turned.yaw, flown.yaw[same], atol=1e-9)
+    np.testing.assert_allclose(turned.velocity, flown.velocity[same], atol=1e-9)

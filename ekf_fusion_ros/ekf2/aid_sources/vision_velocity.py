@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from ekf_fusion_ros.ekf2.aid_sources.vision_body_velocity import fuse_body_velocity
+from ekf_fusion_ros.ekf2.aid_sources.vision_body_velocity import vision_velocity_in_body
 from ekf_fusion_ros.ekf2.events import EventKind
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.fusion import fuse_horizontal_velocity
 from ekf_fusion_ros.ekf2.fusion import fuse_vertical_velocity
 from ekf_fusion_ros.ekf2.resets import Resets
+from ekf_fusion_ros.ekf2.resets import velocity_tells_attitude
 from ekf_fusion_ros.ekf2.resets import vision_velocity_in_filter_frame
 from ekf_fusion_ros.ekf2.state import SECOND
 from ekf_fusion_ros.ekf2.state import VN
-from ekf_fusion_ros.samples import VelocityFrame
 from ekf_fusion_ros.samples import VisionSample
 
 NOISE_FLOOR = 0.05 ** 2
@@ -54,11 +55,10 @@ class VisionVelocity:
         f.last_velocity = velocity[0:2]
         f.last_velocity_variance = noise[0:2]
         gate = f.params.vision.vel_gate
-        in_body = sample.velocity_frame is VelocityFrame.BODY_FRD
-        if in_body and f.params.vision.velocity_tells_attitude:
-            measured = f.rot.T @ np.array(velocity)
-            fuse_body_velocity(f, f.observations.ev_hor_vel, f.observations.ev_ver_vel, measured,
-                               np.maximum(sample.velocity_cov.diagonal(), NOISE_FLOOR), gate)
+        if velocity_tells_attitude(f, sample):
+            measured, variance = vision_velocity_in_body(f, sample)
+            fuse_body_velocity(f, f.observations.ev_hor_vel, f.observations.ev_ver_vel,
+                               np.array(measured), np.maximum(variance, NOISE_FLOOR), gate)
             return
         fuse_horizontal_velocity(f, f.observations.ev_hor_vel, innovation[0:2], noise[0:2], gate)
         fuse_vertical_velocity(f, f.observations.ev_ver_vel, innovation[2], noise[2], gate)
