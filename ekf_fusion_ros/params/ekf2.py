@@ -330,6 +330,10 @@ class FlowParams:
                         px4='EKF2_OF_GATE', ecl='flow_innov_gate')
     max_rate: float = param(2.5, 'Largest rate that the sensor can follow.', unit='rad/s', min=0,
                             max=100)
+    opposed_gyro: bool = param(
+        True, 'Learn the bias of a gyro in the sensor from its sum with the rotation of the '
+        'vehicle, as it gives minus the rotation; off, from their difference as in PX4, which '
+        'takes rotation for bias.')
     position: Vector = param(ZERO, 'Sensor position in the body frame (FRD).', unit='m',
                              ecl='flow_pos_body')
 

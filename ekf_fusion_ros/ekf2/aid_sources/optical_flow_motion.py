@@ -37,6 +37,8 @@ class FlowMotion:
         self.gyro_bias: Array = np.zeros(3)
         self._turn = np.zeros(4)
         self._motion = np.zeros(4)
+        # The sensor gives minus the rotation, so that the sum of both is what is wrong with it.
+        self._against = 1.0 if f.params.flow.opposed_gyro else -1.0
         self._share = FILTER_PERIOD / f.params.imu.accel_bias_learn_time
         self._bad_us = 0
         self._good_us = 0
@@ -73,7 +75,7 @@ class FlowMotion:
         """Return minus the body rotation (3,) in rad over the exposure, None where unknown.
 
         It starts the sum anew. Where the sensor has a gyro of its own, that is returned, and
-        `gyro_bias` (3,) in rad/s follows its difference to the autopilot's.
+        `gyro_bias` (3,) in rad/s follows what it differs from the autopilot's.
         """
         turn, elapsed = self._turn[0:3], self.elapsed
         self._turn = np.zeros(4)
@@ -85,7 +87,7 @@ class FlowMotion:
         comparable = min(elapsed, sample.dt) > 0.0 and abs(elapsed - sample.dt) < INTERVALS_DIFFER
         if not comparable:
             return None
-        difference = sample.gyro / sample.dt - turn / elapsed
+        difference = sample.gyro / sample.dt + self._against * turn / elapsed
         step = np.minimum(np.maximum(difference, -BIAS_STEP), BIAS_STEP)
         self.gyro_bias = (1.0 - BIAS_SHARE) * self.gyro_bias + BIAS_SHARE * step
         return sample.gyro
