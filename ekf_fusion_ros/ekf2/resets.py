@@ -202,12 +202,18 @@ class Resets:
 
 
 def velocity_tells_attitude(f: Filter, sample: VisionSample) -> bool:
-    """Return whether a velocity is to be observed in the body, with which its frame turns."""
-    if not f.params.vision.velocity_tells_attitude:
+    """Return whether a velocity is to be observed in the body, with which its frame turns.
+
+    Not beside absolute positions of a rotated frame: they turn with the attitude as well, so that
+    a yaw which the velocity ties to them would follow its own corrections.
+    """
+    rotated = f.params.vision.rotate and not f.flags.ev_yaw
+    positions_turn = rotated and f.flags.ev_pos and not f.params.gnss.enabled
+    if not f.params.vision.velocity_tells_attitude or positions_turn:
         return False
     if sample.velocity_frame is VelocityFrame.BODY_FRD:
         return True
-    return f.params.vision.rotate and not f.flags.ev_yaw and sample.has_attitude
+    return rotated and sample.has_attitude
 
 
 def vision_velocity_in_filter_frame(f: Filter, sample: VisionSample) -> tuple[Three, Three]:

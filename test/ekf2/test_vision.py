@@ -8,6 +8,7 @@ from ekf2.bench import Bench
 import numpy as np
 import pytest
 
+from ekf_fusion_ros.ekf2.resets import velocity_tells_attitude
 from ekf_fusion_ros.mathlib.rotation import matrix_from_euler_321
 from ekf_fusion_ros.mathlib.rotation import quat_from_matrix
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
@@ -228,3 +229,23 @@ def test_odometry_without_a_velocity_is_used_by_its_position():
     assert 'ev_pos' in bench.flags
     assert 'ev_vel' not in bench.flags
     np.testing.assert_allclose(bench.x[7:9], (1.0, 2.0), atol=0.05)
+
+
+@pytest.mark.parametrize(('changed', 'told'), [
+    ({}, True), ({'frame': VelocityFrame.LOCAL_FRD}, True),
+    ({'velocity_tells_attitude': False}, False),
+    ({'frame': VelocityFrame.LOCAL_FRD, 'rotate': False}, False), ({'rotate': False}, True),
+    ({'frame': VelocityFrame.LOCAL_FRD, 'use_yaw': True}, False), ({'use_yaw': True}, True),
+    # Absolute positions of a rotated frame turn with the attitude too.
+    ({'use_position': True}, False), ({'use_position': True, 'rotate': False}, True),
+    ({'use_position': True, 'fixes': True}, True)])
+def test_velocity_tells_attitude_where_its_frame_turns_with_the_body(changed, told):
+    vision = {'use_velocity': True, 'rotate': True, **changed}
+    frame = vision.pop('frame', VelocityFrame.BODY_FRD)
+    gnss = GnssParams(enabled=vision.pop('fixes', False))
+    bench = aligned(Ekf2Params(gnss=gnss, vision=VisionParams(**vision)))
+    bench.odometry.frame = frame
+    bench.sending.add('vision')
+    bench.run(1.0)
+    f = bench.ekf.filter
+    assert velocity_tells_attitude(f, f.vision) is told
