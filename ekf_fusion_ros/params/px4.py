@@ -196,7 +196,7 @@ def concerns_filter(name: str) -> bool:
 
 
 def read_px4(path: Path) -> tuple[dict[str, float], list[str]]:
-    """Return the EKF2 parameters and MAV_TYPE of a PX4 .params file and what else it holds, in words.
+    """Return EKF2 parameters and MAV_TYPE of a PX4 .params file and what else it holds, in words.
 
     Lines are `vehicle component NAME value type`, `#` starts a comment. Raises ValueError naming
     file and line.

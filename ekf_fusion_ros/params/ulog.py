@@ -10,7 +10,7 @@ MAGIC = b'ULog'
 
 
 def read_ulog(path: Path) -> tuple[dict[str, float], list[str]]:
-    """Return {EKF2 name or MAV_TYPE: value at the start} of a ULog and what else it says, in words.
+    """Return {EKF2 name or MAV_TYPE: first value} of a ULog and what else it says, in words.
 
     Raises ValueError naming the file: no ULog, or the library pyulog is missing.
     """
