@@ -29,6 +29,12 @@ from ekf_fusion_ros.samples import ImuSample
 Array = NDArray[np.float64]
 
 ABSENT = -1.0
+USUAL_OF = 25
+"""Intervals whose median is the usual one."""
+
+MISSING_FROM = 1.5
+"""Multiple of the usual interval above which readings are missing."""
+
 # Places in the flat message, each vector before its covariance.
 ORIENTATION, ORIENTATION_COVARIANCE = slice(0, 4), 4
 RATE, RATE_COVARIANCE = slice(13, 16), 16
@@ -84,9 +90,11 @@ def _flat(message: Any) -> FlatMessage:
 class ImuIntegrator:
     """Turns readings into increments: each reading holds over the interval that it ends.
 
-    That is exact for sensors that publish means over their interval, as autopilots do.
-    `gaps` counts the intervals above `max_gap`; such a one is not filled with a single reading
-    but counts as one ordinary interval.
+    That is exact for sensors that publish means over their interval, as autopilots do. An interval
+    much longer than the usual one means that readings are missing (loggers and best-effort topics
+    lose some): only its last part belongs to the reading, the rest is interpolated. `gaps` counts
+    the intervals above `max_gap`; such a one is not filled at all but counts as one ordinary
+    interval.
     """
 
     def __init__(self, params: MessageParams) -> None:
@@ -99,6 +107,9 @@ class ImuIntegrator:
         """Forget the last reading; the count of gaps stays."""
         self._last_us: int | None = None
         self._interval_us = 0
+        self._before: ImuReading | None = None
+        self._steps_us: list[int] = []
+        self._longest_us = 0
 
     def push(self, reading: ImuReading) -> ImuSample | None:
         """Return the increments up to this reading, None for the first.
@@ -107,7 +118,7 @@ class ImuIntegrator:
         """
         last_us = self._last_us
         if last_us is None:
-            self._last_us = reading.time_us
+            self._last_us, self._before = reading.time_us, reading
             return None
         step_us = reading.time_us - last_us
         if step_us <= 0:
@@ -119,12 +130,37 @@ class ImuIntegrator:
             step_us = self._interval_us or self._max_gap_us
         else:
             self._interval_us = step_us
+        if 0 < self._longest_us < step_us:
+            p, q, r, x, y, z = self._filled(reading, step_us)
+        else:
+            p, q, r = reading.rate
+            x, y, z = reading.specific_force
+        self._note(step_us)
+        self._before = reading
         dt = step_us * 1e-6
-        p, q, r = reading.rate
-        x, y, z = reading.specific_force
         return ImuSample(
             reading.time_us, np.array((p * dt, q * dt, r * dt)),
             np.array((x * dt, y * dt, z * dt)), dt, dt)
+
+
+    def _filled(self, reading: ImuReading, step_us: int) -> list[float]:
+        """Return the means of rate and specific force over an interval that misses readings.
+
+        They lie on the line between their neighbours; their mean is half way.
+        """
+        assert self._before is not None
+        missing = 1.0 - self._longest_us / MISSING_FROM / step_us
+        return [value + 0.5 * missing * (before - value) for value, before in zip(
+            (*reading.rate, *reading.specific_force),
+            (*self._before.rate, *self._before.specific_force), strict=True)]
+
+    def _note(self, step_us: int) -> None:
+        """Learn the usual interval: the median of some, then of the next ones."""
+        self._steps_us.append(step_us)
+        if len(self._steps_us) == USUAL_OF:
+            usual_us = sorted(self._steps_us)[USUAL_OF // 2]
+            self._longest_us = round(MISSING_FROM * usual_us)
+            self._steps_us.clear()
 
 
 def _check_present(numbers: Sequence[float], first: int, name: str) -> None:

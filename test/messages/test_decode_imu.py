@@ -114,6 +114,27 @@ def test_a_long_gap_counts_and_is_no_giant_increment():
     assert integrator.gaps == 1
 
 
+def test_missing_readings_of_an_impact_are_interpolated():
+    """A touchdown of which every fourth mean over 4 ms is lost, as loggers lose them."""
+    times = np.arange(1, 401)
+    since = 0.004 * (times - 301)
+    force = -9.8 - 300.0 * (since >= 0.0) * np.exp(-since / 0.03)
+    held, integrated = 0.0, 0.0
+    integrator = ImuIntegrator(PARAMS)
+    last = 0
+    for k, value in zip(times, force, strict=True):
+        if k % 4 == 2:
+            continue
+        sample = integrator.push(ImuReading(int(k) * 4000, (0.0, 0.0, 0.0), (0.0, 0.0, value)))
+        if sample is not None:
+            assert sample.delta_velocity_dt == pytest.approx(0.004 * (k - last))
+            integrated += sample.delta_velocity[2]
+            held += value * 0.004 * (k - last)
+        last = k
+    truth = 0.004 * force[1:].sum()
+    assert abs(integrated - truth) < 0.2 * abs(held - truth)
+
+
 @pytest.mark.parametrize(('step', 'reason'), [(0, 'repeated_stamp'), (-5, 'backward_stamp')])
 def test_time_must_advance(step, reason):
     integrator = ImuIntegrator(PARAMS)
