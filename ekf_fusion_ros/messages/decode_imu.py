@@ -142,7 +142,6 @@ class ImuIntegrator:
             reading.time_us, np.array((p * dt, q * dt, r * dt)),
             np.array((x * dt, y * dt, z * dt)), dt, dt)
 
-
     def _filled(self, reading: ImuReading, step_us: int) -> list[float]:
         """Return the means of rate and specific force over an interval that misses readings.
 
