@@ -115,8 +115,8 @@ def test_sideslip_of_fixed_wings_only_counts_in_flight():
 def test_sideslip_of_fixed_wings_may_be_switched_off():
     bench = Bench(Ekf2Params(aiding=AidingParams(vehicle='fixed_wing'),
                              air_data=AirDataParams(use_sideslip=False)))
-    bench.fly(on_wings=True)
     bench.run(0.1)
+    bench.ekf.push(LandedSample(bench.now_us, landed=False))
     assert {'in_air', 'fixed_wing'} <= bench.flags and 'fuse_beta' not in bench.flags
 
 
