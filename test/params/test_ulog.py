@@ -66,7 +66,8 @@ def test_flight_by_hand(shared: Path) -> None:
     # Single precision would make it 0.003000000026.
     assert ekf2.imu.accel_bias_process_noise == 0.003
     assert loaded.params.messages.odometry.position_noise == 0.05
-    assert '453 parameters of other PX4 modules' in loaded.unused
+    assert loaded.params.ekf2.aiding.vehicle == 'multirotor'
+    assert '452 parameters of other PX4 modules' in loaded.unused
     assert 'EKF2_MAGBIAS_ID' in loaded.unused
 
 
@@ -75,6 +76,8 @@ def test_log_and_file_of_the_same_parameters_agree(shared: Path, tmp_path: Path)
     lines = [f'1\t1\t{name}\t{value!r}\t{6 if value.is_integer() else 9}'
              for name, value in table_of(shared, FLIGHT).items()]
     path = tmp_path / 'vehicle.params'
+    # The table has the EKF2 parameters only.
+    lines.append('1\t1\tMAV_TYPE\t2\t6')
     path.write_text('# Onboard parameters for Vehicle 1\n' + '\n'.join(lines) + '\n')
     from_file, from_log = load_file(path), load_file(ulog_of(shared, FLIGHT))
     assert from_file.params == from_log.params != Params()
