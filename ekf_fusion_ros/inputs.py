@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Collection
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 from typing import Any
@@ -17,11 +18,14 @@ from ekf_fusion_ros.messages.decode_flow import decode_flow
 from ekf_fusion_ros.messages.decode_gps_heading import decode_gps_heading
 from ekf_fusion_ros.messages.decode_imu import ImuIntegrator
 from ekf_fusion_ros.messages.decode_imu import decode_imu
+from ekf_fusion_ros.messages.decode_imu import decode_imu_rows
 from ekf_fusion_ros.messages.decode_landed import decode_landed
 from ekf_fusion_ros.messages.decode_magnetic_field import decode_magnetic_field
+from ekf_fusion_ros.messages.decode_magnetic_field import decode_magnetic_field_rows
 from ekf_fusion_ros.messages.decode_odometry import decode_odometry
 from ekf_fusion_ros.messages.decode_pressure import decode_pressure
 from ekf_fusion_ros.messages.decode_range import decode_range
+from ekf_fusion_ros.messages.flat import FlatRows
 from ekf_fusion_ros.roles import AIRSPEED
 from ekf_fusion_ros.roles import AUX_VELOCITY
 from ekf_fusion_ros.roles import FIX
@@ -64,6 +68,11 @@ DECODERS: dict[str, Callable[..., Any]] = {
     AUX_VELOCITY: decode_aux_velocity,
 }
 
+ROWS_DECODERS: dict[str, Callable[..., Any]] = {
+    IMU: decode_imu_rows,
+    MAGNETIC_FIELD: decode_magnetic_field_rows,
+}
+
 ROLE_OF_SAMPLE: dict[type, str] = {
     ImuSample: IMU,
     GnssSample: FIX,
@@ -90,6 +99,12 @@ JUMPS = {
 def decoder_of(role: str, params: Params) -> Callable[[Any], Any]:
     """Return the function that turns a message of `role` into a stamped sample."""
     return partial(DECODERS[role], params=params.messages)
+
+
+def rows_decoder_of(role: str, params: Params) -> Callable[[FlatRows], Sequence[Any]] | None:
+    """Return the function that decodes many messages of `role` at once, None without one."""
+    decode = ROWS_DECODERS.get(role)
+    return None if decode is None else partial(decode, params=params.messages)
 
 
 class InertialInput:

@@ -39,21 +39,22 @@ class SensorRates:
     """Measures each role over some seconds; says once that it is slow, until it has recovered."""
 
     def __init__(self, minima: Mapping[str, int]) -> None:
-        """Watch these roles, given with their least rate in Hz."""
+        """Watch these roles, given with their least rate in Hz; due_us: the next judgement."""
         self._watches = {role: _RateWatch(role, minimum) for role, minimum in minima.items()}
-        self._due_us = 0
+        self.due_us = 0
 
     def note(self, role: str, time_us: int) -> None:
         """Count an accepted message by its stamp, once there is inertial time to judge it by."""
         watch = self._watches.get(role)
-        if watch is not None and self._due_us:
+        if watch is not None and self.due_us:
             watch.note(time_us)
 
     def step(self, now_us: int) -> list[str]:
-        """Return a sentence for each role that has become too slow by inertial time now_us."""
-        if now_us < self._due_us:
-            return []
-        self._due_us = now_us + SECOND_US
+        """Return a sentence for each role that has become too slow by inertial time now_us.
+
+        To be called when inertial time has reached `due_us`.
+        """
+        self.due_us = now_us + SECOND_US
         return [watch.sentence() for watch in self._watches.values() if watch.judge(now_us)]
 
     def slow(self) -> list[str]:

@@ -28,6 +28,8 @@ from ekf_fusion_ros.inputs import InertialInput
 from ekf_fusion_ros.inputs import decoder_of
 from ekf_fusion_ros.inputs import make_estimator
 from ekf_fusion_ros.inputs import make_motion_heading
+from ekf_fusion_ros.inputs import rows_decoder_of
+from ekf_fusion_ros.messages.flat import FlatRows
 from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.odometry_heading import OdometryHeading
 from ekf_fusion_ros.roles import AIRSPEED
@@ -139,6 +141,13 @@ class FusionSession:
         except Refused as refusal:
             return refusal
 
+    def rows_decoder(self, role: str) -> Callable[[FlatRows], Sequence[Any]] | None:
+        """Return what decodes many messages of a role as `decode` would, None without one.
+
+        It gives None for each message that `decode` has to look at.
+        """
+        return rows_decoder_of(role, self.params)
+
     def take(self, role: str, decoded: Any) -> list[FusedOutput]:
         """Take what `decode` returned, or a Refused of the caller; return the outputs due."""
         statistics = self._statistics[role]
@@ -147,8 +156,7 @@ class FusionSession:
             self._count_refusal(role, decoded.reason, decoded.detail)
             return []
         try:
-            self._judge_order(role, decoded.time_us)
-            self._judge_worth(role, decoded)
+            self._judge(role, decoded)
         except Refused as refusal:
             self._count_refusal(role, refusal.reason, refusal.detail)
             return []
@@ -166,8 +174,8 @@ class FusionSession:
         try:
             check_sample(sample)
             if self.roles is not None:
-                self._judge_role(role, sample.time_us)
-                self._judge_worth(role, sample)
+                self._judge_role(role)
+                self._judge(role, sample)
             elif isinstance(sample, ImuSample):
                 check_advance(sample.time_us, self._now_us)
         except Refused as refusal:
@@ -201,40 +209,41 @@ class FusionSession:
         self._estimator.push(sample)
         return []
 
-    def _judge_role(self, role: str, time_us: int) -> None:
+    def _judge_role(self, role: str) -> None:
         if self.roles is None or role not in self.roles:
             raise Refused('role_not_in_use', f'the session was made without role {role}')
-        self._judge_order(role, time_us)
 
-    def _judge_order(self, role: str, time_us: int) -> None:
-        if role == LANDED:
-            return
-        if role != self._inertial_role:
-            self._aiding_order[role].judge(time_us, self._inertial_order.last)
-            return
+    def _judge(self, role: str, reading: Any) -> None:
+        """Raise Refused for a reading that comes out of order or is worth nothing."""
+        if role == self._inertial_role:
+            self._judge_inertial_order(role, reading.time_us)
+        elif role != LANDED:
+            self._aiding_order[role].judge(reading.time_us, self._inertial_order.last)
+        if role == AIRSPEED:
+            check_airspeed(reading, self.params.ekf2.aiding)
+
+    def _judge_inertial_order(self, role: str, time_us: int) -> None:
         before = self._inertial_order.last
         step = self._inertial_order.judge(time_us)
-        gap = 0.0 if before is None else (time_us - before) / SECOND_US
-        if step is Step.FORWARD:
-            if gap > self._gap_notice:
-                self._tell(time_us, f'no {role} message for {gap:.3f} s')
-        elif step is Step.RESTART:
+        if before is None:
+            return
+        gap = (time_us - before) / SECOND_US
+        if step is Step.RESTART:
             self._tell(time_us, f'the stamps of {role} jumped by {gap:+.3f} s: the estimator '
                        'starts again')
             self._restart()
             self._inertial_order.judge(time_us)
-
-    def _judge_worth(self, role: str, reading: Any) -> None:
-        if role == AIRSPEED:
-            check_airspeed(reading, self.params.ekf2.aiding)
+        elif gap > self._gap_notice:
+            self._tell(time_us, f'no {role} message for {gap:.3f} s')
 
     def _accept(self, role: str, sample: Any) -> list[FusedOutput]:
         if role not in PARTS_OF_FIX:
             self._statistics[role].accepted += 1
         self._rates.note(role, sample.time_us)
         if role == self._inertial_role:
-            for slow in self._rates.step(sample.time_us):
-                self._tell(sample.time_us, slow)
+            if sample.time_us >= self._rates.due_us:
+                for slow in self._rates.step(sample.time_us):
+                    self._tell(sample.time_us, slow)
             return self._run(role, sample)
         if role == LANDED:
             self._landed = sample

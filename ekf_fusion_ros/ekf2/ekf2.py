@@ -5,7 +5,9 @@ Reference behaviour: PX4-ECL of July 2021. What differs, and why: docs/px4_diffe
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,6 +73,23 @@ class Ekf2:
         self._ground_contact = GroundContact(self.filter)
         self._raw: ImuSample | None = None
         self.initialised = False
+        self._queues = self._make_queues()
+
+    def _make_queues(self) -> dict[type, Callable[[Any, int], object]]:
+        """Return what takes each kind of sample, with the least interval between two in us."""
+        control = self.control
+        return {
+            MagSample: control.mag.push,
+            BaroSample: control.baro.push,
+            VisionSample: control.vision.push,
+            GnssSample: self._push_fix,
+            RangeSample: control.range.push,
+            FlowSample: control.flow.push,
+            AirspeedSample: control.airspeed.push,
+            AuxVelocitySample: control.aux_velocity.push,
+            HeadingSample: lambda sample, _: control.vision.heading.push(sample),
+            LandedSample: lambda sample, _: self._ground_contact.tell(sample),
+        }
 
     def push(self, sample: Sample) -> None:
         """Queue a measurement; those before the first ImuSample have no effect."""
@@ -79,28 +98,8 @@ class Ekf2:
                 self.update()
             self._raw = sample
             self.inertial.started = True
-        elif not self.inertial.started:
-            return
-        elif isinstance(sample, MagSample):
-            self.control.mag.push(sample, self.inertial.min_interval_us)
-        elif isinstance(sample, BaroSample):
-            self.control.baro.push(sample, self.inertial.min_interval_us)
-        elif isinstance(sample, VisionSample):
-            self.control.vision.push(sample, self.inertial.min_interval_us)
-        elif isinstance(sample, GnssSample):
-            self._push_fix(sample)
-        elif isinstance(sample, RangeSample):
-            self.control.range.push(sample, self.inertial.min_interval_us)
-        elif isinstance(sample, FlowSample):
-            self.control.flow.push(sample, self.inertial.min_interval_us)
-        elif isinstance(sample, AirspeedSample):
-            self.control.airspeed.push(sample, self.inertial.min_interval_us)
-        elif isinstance(sample, AuxVelocitySample):
-            self.control.aux_velocity.push(sample, self.inertial.min_interval_us)
-        elif isinstance(sample, HeadingSample):
-            self.control.vision.heading.push(sample)
-        elif isinstance(sample, LandedSample):
-            self._ground_contact.tell(sample)
+        elif self.inertial.started:
+            self._queues[type(sample)](sample, self.inertial.min_interval_us)
 
     def update(self) -> bool:
         """Process the pushed ImuSample; True when the filter advanced by a period."""
@@ -160,10 +159,9 @@ class Ekf2:
         if learned:
             self._accel_bias_check.step(down_bias)
 
-    def _push_fix(self, sample: GnssSample) -> None:
-        interval = self.inertial.min_interval_us
+    def _push_fix(self, sample: GnssSample, min_interval_us: int) -> None:
         altitude_before = self.filter.earth.alt_ref
-        origin_set = self.control.gnss.push(sample, interval, self.initialised)
+        origin_set = self.control.gnss.push(sample, min_interval_us, self.initialised)
         if origin_set:
             self.control.height.refer_to(self.filter.earth.alt_ref - altitude_before)
         if origin_set and self.params.height.reference == 'gnss':

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 from typing import NamedTuple
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from ekf_fusion_ros import frames
 from ekf_fusion_ros.mathlib.rotation import quat_multiply
 from ekf_fusion_ros.messages import fields
 from ekf_fusion_ros.messages.flat import FlatMessage
+from ekf_fusion_ros.messages.flat import FlatRows
 from ekf_fusion_ros.messages.flat import elements
 from ekf_fusion_ros.messages.flat import flat_message
 from ekf_fusion_ros.messages.flat import xyz
@@ -21,6 +23,7 @@ from ekf_fusion_ros.messages.mounting import body_to_sensor_quaternion
 from ekf_fusion_ros.messages.mounting import turned_to_body
 from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.messages.stamps import checked_stamp
+from ekf_fusion_ros.messages.stamps import plain_stamps
 from ekf_fusion_ros.params.messages import ZERO
 from ekf_fusion_ros.params.messages import ImuMessageParams
 from ekf_fusion_ros.params.messages import MessageParams
@@ -75,6 +78,31 @@ def decode_imu(message: Any, params: MessageParams) -> ImuReading:
     return ImuReading(
         time_us, turned_to_body(rate, imu.mount_rpy, frame_id),
         turned_to_body(force, imu.mount_rpy, frame_id), orientation)
+
+
+def decode_imu_rows(rows: FlatRows, params: MessageParams) -> list[ImuReading | None]:
+    """Return Imu messages as readings, None for each that `decode_imu` has to look at.
+
+    The numbers are those of `decode_imu`; what is not plainly good is left to it, which knows
+    why it refuses.
+    """
+    imu, columns = params.imu, rows.numbers.T
+    times, good = plain_stamps(rows.sec, rows.nanosec)
+    for name, limit in ((RATE, imu.max_rate), (FORCE, imu.max_acceleration)):
+        good &= (np.abs(columns[name]) <= limit).all(axis=0)
+    for first in (RATE_COVARIANCE, FORCE_COVARIANCE):
+        good &= (columns[first:first + 9:4] >= 0.0).all(axis=0)
+    rates, forces = (
+        zip(*(column.tolist() for column in turned_to_body(columns[name], imu.mount_rpy,
+                                                           rows.frame_id)), strict=True)
+        for name in (RATE, FORCE))
+    readings = [ImuReading(*reading) if plain else None for plain, *reading in zip(
+        good.tolist(), times.tolist(), rates, forces, strict=True)]
+    present = good & (columns[ORIENTATION_COVARIANCE] != ABSENT)
+    for k in np.flatnonzero(present).tolist():
+        orientation = _orientation(rows.numbers[k, ORIENTATION].tolist(), rows.frame_id, imu)
+        readings[k] = cast(ImuReading, readings[k])._replace(orientation=orientation)
+    return readings
 
 
 def _flat(message: Any) -> FlatMessage:

@@ -8,12 +8,14 @@ import numpy as np
 
 from ekf_fusion_ros.messages import fields
 from ekf_fusion_ros.messages.flat import FlatMessage
+from ekf_fusion_ros.messages.flat import FlatRows
 from ekf_fusion_ros.messages.flat import elements
 from ekf_fusion_ros.messages.flat import flat_message
 from ekf_fusion_ros.messages.flat import xyz
 from ekf_fusion_ros.messages.mounting import turned_to_body
 from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.messages.stamps import checked_stamp
+from ekf_fusion_ros.messages.stamps import plain_stamps
 from ekf_fusion_ros.params.messages import MessageParams
 from ekf_fusion_ros.samples import MagSample
 
@@ -33,6 +35,22 @@ def decode_magnetic_field(message: Any, params: MessageParams) -> MagSample:
         raise Refused('zero_field', 'magnetic_field is all zero: the sensor does not measure')
     x, y, z = turned_to_body(tesla, params.magnetic_field.mount_rpy, flat.frame_id)
     return MagSample(time_us, GAUSS_PER_TESLA * np.array((x, y, z)))
+
+
+def decode_magnetic_field_rows(rows: FlatRows, params: MessageParams) -> list[MagSample | None]:
+    """Return MagneticField messages as samples, None for each that decode_magnetic_field judges.
+
+    The numbers are the same.
+    """
+    limits, columns = params.magnetic_field, rows.numbers.T
+    times, good = plain_stamps(rows.sec, rows.nanosec)
+    tesla = columns[FIELD]
+    good &= (np.abs(tesla) <= limits.max_field).all(axis=0) & tesla.any(axis=0)
+    good &= (columns[COVARIANCE][::4] >= 0.0).all(axis=0)
+    field = GAUSS_PER_TESLA * np.stack(
+        turned_to_body(tesla, limits.mount_rpy, rows.frame_id), axis=1)
+    return [MagSample(time_us, row.copy()) if plain else None for plain, time_us, row in zip(
+        good.tolist(), times.tolist(), field, strict=True)]
 
 
 def _flat(message: Any) -> FlatMessage:

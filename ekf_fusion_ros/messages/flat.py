@@ -11,8 +11,12 @@ from typing import Any
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ekf_fusion_ros.messages.refusal import Refused
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 class FlatMessage(NamedTuple):
@@ -26,6 +30,23 @@ class FlatMessage(NamedTuple):
     frame_id: str
     numbers: Sequence[float]
     child_frame_id: str = ''
+
+
+class FlatRows(NamedTuple):
+    """Messages of one type and frame, so many that they are judged together.
+
+    sec, nanosec (n,) integers; numbers (n, m), a row as FlatMessage has them.
+    """
+
+    sec: Integers
+    nanosec: Integers
+    frame_id: str
+    numbers: Array
+
+    def row(self, index: int) -> FlatMessage:
+        """Return one message."""
+        return FlatMessage(int(self.sec[index]), int(self.nanosec[index]), self.frame_id,
+                           self.numbers[index].tolist())
 
 
 def flat_message(message: Any, numbers: Sequence[float], child_frame_id: str = '') -> FlatMessage:

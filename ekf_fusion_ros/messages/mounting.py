@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -35,9 +34,11 @@ def sensor_to_body(rpy: Vector, frame_id: str) -> Array:
     return rotation
 
 
-def turned_to_body(
-        vector: Sequence[float], rpy: Vector, frame_id: str) -> tuple[float, float, float]:
-    """Return a vector of sensor axes in body FRD; numpy would take three times as long."""
+def turned_to_body(vector: Any, rpy: Vector, frame_id: str) -> tuple[Any, Any, Any]:
+    """Return a vector of sensor axes in body FRD; its elements are floats or arrays (n,).
+
+    For a single vector numpy would take three times as long.
+    """
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = _rows(rpy, frame_id)
     x, y, z = vector
     return (xx * x + xy * y + xz * z, yx * x + yy * y + yz * z, zx * x + zy * y + zz * z)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ekf_fusion_ros.messages.refusal import Refused
 
 SECOND_US = 1_000_000
@@ -34,3 +37,11 @@ def checked_stamp(sec: int, nanosec: int) -> int:
             'zero_stamp',
             f'header.stamp is {sec}.{nanosec:09d}: the driver must stamp its messages')
     return time_us
+
+
+def plain_stamps(
+    sec: NDArray[np.int64], nanosec: NDArray[np.int64],
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return stamps (n,) in microseconds, and which of them `checked_stamp` would take."""
+    times = sec * SECOND_US + (nanosec + 500) // 1000
+    return times, (times > 0) & (nanosec >= 0) & (nanosec < NANOSECONDS)

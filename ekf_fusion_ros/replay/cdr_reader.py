@@ -8,17 +8,21 @@ go to the rosbags library.
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Sequence
 from functools import lru_cache
 from functools import partial
 import struct
 from typing import Any
 
+import numpy as np
 from rosbags.typesys import Stores
 from rosbags.typesys import get_typestore
 
 from ekf_fusion_ros.messages.flat import FlatMessage
+from ekf_fusion_ros.messages.flat import FlatRows
 
 LITTLE_ENDIAN = b'\x00\x01'
+LITTLE = np.frombuffer(LITTLE_ENDIAN, np.uint8)
 # Offsets count from the end of the encapsulation header.
 ORIGIN = 4
 STRING = 12
@@ -39,6 +43,29 @@ def reader_of(kind: str) -> Callable[[bytes], Any]:
         return store.deserialize_cdr(data, kind)
 
     return read
+
+
+def rows_of(numbers: int, messages: Sequence[bytes]) -> FlatRows | None:
+    """Return messages of a header and so many doubles, None unless all have one layout and frame.
+
+    Raises ValueError for bytes that are no such messages.
+    """
+    first = messages[0]
+    length = _length(first, ORIGIN + 8)
+    begin = ORIGIN + STRING + length
+    begin += -(begin - ORIGIN) % 8
+    size = begin + 8 * numbers
+    if any(len(data) != len(first) for data in messages) or len(first) < size:
+        return None
+    table = np.frombuffer(b''.join(messages), np.uint8).reshape(len(messages), -1)
+    name = slice(ORIGIN + 8, ORIGIN + STRING + length)
+    alike = (table[:, name] == table[0, name]).all() and (table[:, :2] == LITTLE).all()
+    if not alike:
+        return None
+    stamps = np.ascontiguousarray(table[:, ORIGIN:ORIGIN + 8]).view('<i4, <u4')[:, 0]
+    values = np.ascontiguousarray(table[:, begin:size]).view('<f8').astype(np.float64, copy=False)
+    return FlatRows(stamps['f0'].astype(np.int64), stamps['f1'].astype(np.int64),
+                    _text(first[ORIGIN + STRING:ORIGIN + STRING + length]), values)
 
 
 _LENGTH = struct.Struct('<I').unpack_from
@@ -116,16 +143,20 @@ def _odometry(data: bytes) -> FlatMessage:
     return FlatMessage(v[0], v[1], _text(v[2]), v[4:], _text(v[3]))
 
 
+# Messages that are a header and so many doubles.
+DOUBLES = {
+    'sensor_msgs/msg/Imu': 37,
+    'sensor_msgs/msg/MagneticField': 12,
+    'sensor_msgs/msg/FluidPressure': 2,
+    'geometry_msgs/msg/Vector3Stamped': 3,
+    'geometry_msgs/msg/PoseStamped': 7,
+    'geometry_msgs/msg/PoseWithCovarianceStamped': 43,
+    'geometry_msgs/msg/TwistStamped': 6,
+    'geometry_msgs/msg/TwistWithCovarianceStamped': 42,
+}
 READERS: dict[str, Callable[[bytes], FlatMessage]] = {
     'nav_msgs/msg/Odometry': _odometry,
     'sensor_msgs/msg/NavSatFix': _nav_sat_fix,
-    'sensor_msgs/msg/Imu': partial(_doubles, '37d'),
-    'sensor_msgs/msg/MagneticField': partial(_doubles, '12d'),
-    'sensor_msgs/msg/FluidPressure': partial(_doubles, '2d'),
     'sensor_msgs/msg/Range': _range,
-    'geometry_msgs/msg/Vector3Stamped': partial(_doubles, '3d'),
-    'geometry_msgs/msg/PoseStamped': partial(_doubles, '7d'),
-    'geometry_msgs/msg/PoseWithCovarianceStamped': partial(_doubles, '43d'),
-    'geometry_msgs/msg/TwistStamped': partial(_doubles, '6d'),
-    'geometry_msgs/msg/TwistWithCovarianceStamped': partial(_doubles, '42d'),
+    **{kind: partial(_doubles, f'{count}d') for kind, count in DOUBLES.items()},
 }

@@ -25,11 +25,8 @@ from tqdm import tqdm
 from ekf_fusion_ros.estimator import Event
 from ekf_fusion_ros.fused_output import FusedOutput
 from ekf_fusion_ros.inputs import ROLE_OF_SAMPLE
-from ekf_fusion_ros.messages.flat import FlatMessage
-from ekf_fusion_ros.messages.refusal import Refused
-from ekf_fusion_ros.messages.stamps import microseconds
 from ekf_fusion_ros.params import Params
-from ekf_fusion_ros.replay.cdr_reader import reader_of
+from ekf_fusion_ros.replay.decoding import BatchDecoder
 from ekf_fusion_ros.replay.options import ReplayOptions
 from ekf_fusion_ros.replay.sinks import AlignmentSink
 from ekf_fusion_ros.replay.sinks import BagSink
@@ -222,13 +219,11 @@ def _bag_steps(
 ) -> Iterator[list[FusedOutput]]:
     """Hand the messages to the session, yielding the outputs that are due."""
     session, withholding, options = run.session, run.withholding, run.options
-    decode = {topic.name: _decoder(role, topic.type, session, withholding)
-              for role, topic in choice.topics.items()}
+    decoder = BatchDecoder(choice.topics, session, withholding)
     total = sum(topic.count for topic in choice.topics.values())
-    messages = _between(recording, recording.messages(decode), options)
+    messages = _between(recording, recording.messages(decoder.names), options)
     for batch in _batches(messages, total, options.progress):
-        decoded = [decode[name](data, time_ns) for time_ns, name, data in batch]
-        for role, sample in decoded:
+        for role, sample in decoder.decode(batch):
             outputs = session.take(role, sample)
             if outputs:
                 yield outputs
@@ -245,26 +240,6 @@ def _between(
         return messages
     last_ns = recording.start_ns + round(1e9 * options.end)
     return takewhile(lambda message: message[0] < last_ns, messages)
-
-
-def _decoder(
-    role: str, kind: str, session: FusionSession, withholding: Withholding,
-) -> Callable[[bytes, int], tuple[str, Any]]:
-    """Return what turns the bytes of a topic into its role and a sample or Refused."""
-    read, decode = reader_of(kind), session.decode
-    withheld = role in withholding.roles
-
-    def decoded(data: bytes, log_time_ns: int) -> tuple[str, Any]:
-        try:
-            message = read(data)
-        except Exception as error:
-            # Damaged bytes can make the reader raise anything.
-            return role, Refused('undecodable', f'{len(data)} bytes are no {kind} ({error})')
-        if withheld and withholding.holds(role, _stamp_us(message, log_time_ns)):
-            return role, Refused('withheld', '')
-        return role, decode(role, message)
-
-    return decoded
 
 
 def _csv_steps(run: _Run) -> Iterator[list[FusedOutput]]:
@@ -313,11 +288,3 @@ def _batches(items: Iterator[Any], total: int | None, shown: bool) -> Iterator[l
         while batch := list(islice(items, BATCH)):
             yield batch
             bar.update(len(batch))
-
-
-def _stamp_us(message: Any, log_time_ns: int) -> int:
-    """Return the stamp of a message, of one without a header the time it was logged."""
-    if not isinstance(message, FlatMessage) and not hasattr(message, 'header'):
-        return log_time_ns // 1000
-    stamp = message if isinstance(message, FlatMessage) else message.header.stamp
-    return microseconds(stamp.sec, stamp.nanosec)
