@@ -56,6 +56,11 @@ class FixAssembly:
         stage = self._stages.index(role)
         return self._through(stage + 1, self._pairings[stage].push(part))
 
+    @property
+    def waiting(self) -> bool:
+        """True while a fix or a part of one waits for its partner."""
+        return any(pairing.waiting for pairing in self._pairings)
+
     def advance(self, now_us: int) -> Sequence[GnssSample]:
         """Return the fixes whose wait is over at inertial time `now_us`."""
         fixes: Sequence[GnssSample] = ()

@@ -31,14 +31,15 @@ class Holding:
         entry = (sample.time_us, RANK[role], self._sequence, role, sample)
         heapq.heappush(self._heap, entry)
 
+    def due(self, now_us: int) -> bool:
+        """Return whether `release` has something to give."""
+        heap = self._heap
+        return bool(heap) and (heap[0][0] + self._hold_us <= now_us or len(heap) > HELD_MAX)
+
     def release(self, now_us: int | None) -> Sequence[tuple[str, Any]]:
         """Return what is due before the inertial stamp `now_us`; None: before there is one."""
         limit = -1 if now_us is None else now_us - self._hold_us
-        heap = self._heap
-        # Asked before every inertial step, mostly in vain.
-        if not heap or (heap[0][0] > limit and len(heap) <= HELD_MAX):
-            return ()
-        due = []
+        heap, due = self._heap, []
         while heap and (heap[0][0] <= limit or len(heap) > HELD_MAX):
             due.append(heapq.heappop(heap)[3:])
         return due

@@ -314,10 +314,11 @@ class FusionSession:
             self._push_odometry(reading)
         holding, assembly = self._holding, self._assembly
         for imu in increments:
-            for due in holding.release(imu.time_us):
-                self._aid(*due)
-            for fix in assembly.advance(imu.time_us):
-                self._push_fix(fix)
+            if holding.due(imu.time_us):
+                for due in holding.release(imu.time_us):
+                    self._aid(*due)
+            if assembly.waiting:
+                self._push_fixes(assembly.advance(imu.time_us))
             output = self._advance(imu)
             if output is not None:
                 outputs.append(output)
