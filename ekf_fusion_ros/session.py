@@ -432,13 +432,24 @@ class FusionSession:
         return Health(health.level if fine else max(health.level, HealthLevel.WARN),
                       '; '.join([text, *slow]), {**health.values, **self._rates.values()})
 
-    def _waiting_for(self) -> str:
+    @property
+    def inertial_role(self) -> str:
+        """Role whose messages drive time."""
+        return self._inertial_role
+
+    @property
+    def waiting_role(self) -> str:
+        """First role of which nothing was accepted and without which nothing starts, or ''."""
         if self.roles is None:
             return ''
         needed = [self._inertial_role] + ([] if self._local else [FIX])
-        for role in needed:
-            if self._statistics[role].accepted == 0:
-                return f'waiting for {role}: {self._statistics[role].summary()}'
+        missing = [role for role in needed if self._statistics[role].accepted == 0]
+        return missing[0] if missing else ''
+
+    def _waiting_for(self) -> str:
+        role = self.waiting_role
+        if role:
+            return f'waiting for {role}: {self._statistics[role].summary()}'
         nav = self._estimator.nav_state()
         aligned = nav is not None and nav.yaw_aligned
         return '' if aligned or self._motion is None else self._motion.status().text

@@ -13,21 +13,28 @@ class RoleStatistics:
     """Counts of one role.
 
     `pending` messages wait for a partner and will be one or the other. `details` holds the
-    first sentence said for each reason.
+    first sentence said for each reason, `last` reason and sentence of the newest refusal.
     """
 
     received: int = 0
     accepted: int = 0
     refused: dict[str, int] = field(default_factory=dict)
     details: dict[str, str] = field(default_factory=dict)
+    last: tuple[str, str] = ('', '')
 
     def refuse(self, reason: str, detail: str = '') -> bool:
         """Count a refusal; True when this reason is new."""
         first = reason not in self.refused
         self.refused[reason] = self.refused.get(reason, 0) + 1
+        self.last = (reason, detail)
         if first:
             self.details[reason] = detail
         return first
+
+    @property
+    def last_refusal(self) -> str:
+        """Newest refusal in words, '' without one."""
+        return ': '.join(part for part in self.last if part)
 
     @property
     def refused_total(self) -> int:

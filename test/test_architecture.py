@@ -26,6 +26,7 @@ LAYERS = (
         'holding', 'inputs', 'odometry_heading', 'pairing', 'roles', 'sample_check',
         'sensor_rates', 'stamp_order', 'statistics', 'warm_up',
     ),
+    ('live',),
     ('analysis',),
     ('node', 'replay'),
     ('simulation',),
@@ -34,7 +35,7 @@ LAYERS = (
 LEVEL = {part: level for level, parts in enumerate(LAYERS) for part in parts}
 STRANGERS = ({'ekf2', 'lpe'}, {'node', 'replay'})
 FAMILIES = ({'magnetometer', 'magnetic_fusion', 'magnetic_course'},)
-CORE = {part for parts in LAYERS[:7] for part in parts}
+CORE = {part for parts in LAYERS[:8] for part in parts}
 
 MESSAGES = {
     'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'nav_msgs', 'sensor_msgs',

@@ -72,8 +72,19 @@ def _uncertainty(ekf: Ekf2) -> dict[str, str]:
 def _gps_checks(ekf: Ekf2) -> dict[str, str]:
     """Return the checks of the last fix: skipped where it does not tell."""
     results = ekf.control.checks.results
-    return {f'gps_check.{word}': VERDICTS[results[name].failed]
-            for name, word in GPS_CHECKS.items()}
+    verdicts = {f'gps_check.{word}': VERDICTS[results[name].failed]
+                for name, word in GPS_CHECKS.items()}
+    details = {f'gps_check_detail.{word}': _measured(ekf, name)
+               for name, word in GPS_CHECKS.items() if results[name].failed is not None}
+    return verdicts | details
+
+
+def _measured(ekf: Ekf2, check: str) -> str:
+    """Return value and limit of a check, and whether its verdict counts."""
+    result = ekf.control.checks.results[check]
+    counts = check == 'fix' or getattr(ekf.params.gnss.checks, check)
+    words = [] if math.isnan(result.value) else [f'{result.value:.3g}', f'limit {result.limit:g}']
+    return ', '.join(words if counts else [*words, 'not selected'])
 
 
 def _vibration(ekf: Ekf2) -> dict[str, str]:

@@ -103,8 +103,16 @@ def _state(ekf: Ekf2) -> tuple[HealthLevel, str]:
         seconds = (f.t_now - f.last_aiding_us) * 1e-6 if f.last_aiding_us else math.inf
         return HealthLevel.ERROR, f'dead reckoning on inertial data for {seconds:.0f} s'
     if wants_gnss and not flags.gps:
-        return HealthLevel.WARN, f'GNSS not used; {_sources(ekf)}'
+        return HealthLevel.WARN, _without_gnss(ekf)
     return HealthLevel.OK, f'ok: {_sources(ekf)}'
+
+
+def _without_gnss(ekf: Ekf2) -> str:
+    f = ekf.filter
+    last_fused_us = f.observations.gps_hor_pos.last_fused_us
+    if not last_fused_us or not (f.flags.ev_pos or f.flags.ev_vel):
+        return f'GNSS not used; {_sources(ekf)}'
+    return f'dead reckoning on odometry {(f.t_now - last_fused_us) * 1e-6:.0f} s; {_sources(ekf)}'
 
 
 def _sources(ekf: Ekf2) -> str:

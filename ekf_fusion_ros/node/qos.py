@@ -7,9 +7,15 @@ the `qos_overrides.*` parameters of ROS 2.
 
 from __future__ import annotations
 
+from typing import Any
+
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
 from rclpy.qos import HistoryPolicy
 from rclpy.qos import QoSProfile
 from rclpy.qos import ReliabilityPolicy
+from rclpy.qos import qos_policy_name_from_kind
 
 SENSOR_DEPTH = 200
 IMU_DEPTH = 1000
@@ -31,3 +37,26 @@ def output_qos() -> QoSProfile:
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST, depth=OUTPUT_DEPTH,
         reliability=ReliabilityPolicy.RELIABLE)
+
+
+def subscription_events(node: Node, topic: str) -> SubscriptionEventCallbacks:
+    """Return what tells the log of a publisher that this subscription cannot hear."""
+    def incompatible(event: Any) -> None:
+        node.get_logger().warning(
+            f'{topic}: a publisher offers {_policy(event)} that does not match, and nothing of '
+            f'it is heard: change it there, or qos_overrides.{topic}.subscription here')
+    return SubscriptionEventCallbacks(incompatible_qos=incompatible)
+
+
+def publisher_events(node: Node, topic: str) -> PublisherEventCallbacks:
+    """Return what tells the log of a subscription that cannot hear this publisher."""
+    def incompatible(event: Any) -> None:
+        node.get_logger().warning(
+            f'{topic}: a listener asks for {_policy(event)} that does not match, and hears '
+            f'nothing: change it there, or qos_overrides.{topic}.publisher here')
+    return PublisherEventCallbacks(incompatible_qos=incompatible)
+
+
+def _policy(event: Any) -> str:
+    """Return the name of the policy in an incompatible-QoS event."""
+    return qos_policy_name_from_kind(event.last_policy_kind).lower()

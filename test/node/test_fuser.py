@@ -131,7 +131,8 @@ def test_parameters_are_described_to_other_nodes(start_fuser: StartFuser, peer: 
 def test_silence_is_said(start_fuser: StartFuser, peer: Peer) -> None:
     fuser = start_fuser()
     peer.connect(fuser, TWO_TOPICS)
-    assert peer.reports['estimator'].message.startswith('waiting for odometry')
+    assert peer.reports['estimator'].message == (
+        'waiting for odometry: /odom has 0 messages, 1 reliable publisher')
     assert peer.reports['odometry'].message == 'nothing received on /odom yet'
     assert peer.reports['fix'].message == 'nothing received on /fix yet'
 
@@ -248,8 +249,8 @@ def test_an_unexpected_error_is_counted_and_said_once(
             node._queue('odometry', odometry(number))
         while node._intake:
             node._run_core()
-        assert node._trouble['internal_errors'] == 3
-        node._report()
+        assert node._work.trouble['internal_errors'] == 3
+        node._reporting.report()
     finally:
         node.destroy_node()
         rclpy.shutdown()
