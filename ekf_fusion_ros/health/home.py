@@ -21,9 +21,6 @@ SECOND = 1_000_000
 FIX_RECENT_US = 3 * SECOND
 """Age of a fix above which there is none: receivers of 1 Hz count too."""
 
-RESTART_HOLDOFF_US = 500_000
-"""Time from the start in which home is not set again: it may be a restart in the air."""
-
 MOVED = 2.0
 """Distance from home, in accuracies, by which a landed vehicle has been moved."""
 
@@ -94,27 +91,23 @@ class HomePosition:
         self._projection = projection
         self.home: Home | None = None
         self.missing: tuple[Shortfall, ...] = ()
-        self._start_us: int | None = None
         self._origin: GeoPoint | None = None
         self._yaw_jump: float | None = None
 
     def step(self, s: Situation) -> bool:
         """Return whether home has been set, or set again."""
-        now_us = s.nav.time_us
-        if self._start_us is None:
-            self._start_us = now_us
         self._note_missing(s)
         self._follow(s.nav)
-        if not self._due(s, now_us - self._start_us) or self.missing:
+        if not self._due(s) or self.missing:
             return False
         self._set(s.nav)
         return True
 
-    def _due(self, s: Situation, running_us: int) -> bool:
+    def _due(self, s: Situation) -> bool:
         if self.home is not None and self.home.manual:
             return False
         if s.just_armed or (s.took_off and s.armed):
-            return running_us >= RESTART_HOLDOFF_US
+            return True
         if self.home is None:
             return not s.armed
         return s.armed is False and s.landed and self._is_moved(s)
@@ -156,7 +149,7 @@ class HomePosition:
     def forget_time(self) -> None:
         """Keep home through a restart of the estimator, whose jumps begin at zero again."""
         self.missing = ()
-        self._start_us = self._yaw_jump = None
+        self._yaw_jump = None
 
     def _follow(self, nav: NavState) -> None:
         """Turn home with the jumps of yaw, and move it with the origin."""

@@ -82,7 +82,7 @@ class NavigationHealth:
         self._step_test(now_us, nav, estimator, on_ground, armed)
         self._step_flags(now_us, nav, accuracy, on_ground)
         self._situation = Situation(
-            nav, accuracy, self._flags['global position'].valid,
+            nav, accuracy, nav.origin is not None and self._flags['global position'].valid,
             self._flags['local position'].valid, on_ground, took_off, armed,
             bool(armed) and not self._was_armed, fix)
         self._step_home(now_us, self._situation)
@@ -109,7 +109,8 @@ class NavigationHealth:
         self, now_us: int, nav: NavState, accuracy: Accuracy, landed: bool,
     ) -> None:
         fresh = self._last_us is None or now_us - self._last_us <= self._timeout_us
-        if nav.global_position_valid and nav.gnss_started and nav.yaw_aligned:
+        on_earth = nav.origin is not None and nav.gnss_started and nav.yaw_aligned
+        if nav.global_position_valid and on_earth:
             self._global_us = now_us
         global_known = self._global_us is not None \
             and now_us - self._global_us <= self._timeout_us
