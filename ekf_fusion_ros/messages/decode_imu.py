@@ -92,13 +92,14 @@ def decode_imu_rows(rows: FlatRows, params: MessageParams) -> list[ImuReading | 
         good &= (np.abs(columns[name]) <= limit).all(axis=0)
     for first in (RATE_COVARIANCE, FORCE_COVARIANCE):
         good &= (columns[first:first + 9:4] >= 0.0).all(axis=0)
+    present = good & (columns[ORIENTATION_COVARIANCE] != ABSENT)
+    columns = np.where(good, columns, 0.0)
     rates, forces = (
         zip(*(column.tolist() for column in turned_to_body(columns[name], imu.mount_rpy,
                                                            rows.frame_id)), strict=True)
         for name in (RATE, FORCE))
     readings = [ImuReading(*reading) if plain else None for plain, *reading in zip(
         good.tolist(), times.tolist(), rates, forces, strict=True)]
-    present = good & (columns[ORIENTATION_COVARIANCE] != ABSENT)
     for k in np.flatnonzero(present).tolist():
         orientation = _orientation(rows.numbers[k, ORIENTATION].tolist(), rows.frame_id, imu)
         readings[k] = cast(ImuReading, readings[k])._replace(orientation=orientation)

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from rosbags.typesys import Stores
+from rosbags.typesys import get_typestore
 
 from ekf_fusion_ros.messages.decode_imu import decode_imu
 from ekf_fusion_ros.messages.decode_imu import decode_imu_rows
@@ -14,8 +16,6 @@ from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.params.messages import ImuMessageParams
 from ekf_fusion_ros.params.messages import MessageParams
 from ekf_fusion_ros.replay.cdr_reader import rows_of
-from rosbags.typesys import Stores
-from rosbags.typesys import get_typestore
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 IMU = 'sensor_msgs/msg/Imu'
