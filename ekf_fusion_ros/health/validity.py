@@ -15,7 +15,8 @@ class ValidityFlag:
     """One flag that clears at once and comes back after a probation without failure.
 
     Its behaviour is that of PX4's commander as the description of COM_POS_FS_PROB has it, at any
-    rate of steps. Times in integer microseconds, accuracies 1-sigma in m or m/s.
+    rate of steps. Probation follows a loss: what was never valid has lost nothing, so that a
+    vehicle that is in motion at the start need not wait for long. Times in integer microseconds, accuracies 1-sigma in m or m/s.
     """
 
     def __init__(self, limit: float, params: HealthParams) -> None:
@@ -28,6 +29,7 @@ class ValidityFlag:
         self.passing = False
         self.probation = SHORTEST_PROBATION
         self.invalid_since_us = 0
+        self._was_valid = False
         self._last_fail_us: int | None = None
         self._last_step_us = 0
 
@@ -59,18 +61,19 @@ class ValidityFlag:
         assert self._last_fail_us is not None
         if not self.valid:
             self.valid = now_us - self._last_fail_us > round(self.probation * SECOND)
+            self._was_valid |= self.valid
             return
         good = (now_us - self._last_step_us) / SECOND
         self.probation = max(self.probation - good, SHORTEST_PROBATION)
 
     def _fail(self, now_us: int) -> None:
         assert self._last_fail_us is not None
-        if not self.valid:
+        if self.valid:
+            self.invalid_since_us = now_us
+        elif self._was_valid:
             bad = (now_us - self._last_fail_us) / SECOND
             longer = self.probation + self._gain * bad
             self.probation = min(longer, LONGEST_PROBATION)
-        else:
-            self.invalid_since_us = now_us
         self.valid = False
         self._last_fail_us = now_us
 

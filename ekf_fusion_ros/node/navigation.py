@@ -29,8 +29,8 @@ FLAGS = ('global_position_valid', 'local_position_valid', 'local_velocity_valid'
 class NavigationPublisher:
     """Publishes `home`, `home/pose` and `navigation/<flag>` where they change.
 
-    Late subscribers get the latest. A Bool has no stamp, so flags must not stand while time does: with no inertial input for
-    `health.timeout` of the steady clock they are false.
+    Late subscribers get the latest. A Bool has no stamp, so flags must not stand while time does:
+    with no inertial input for `health.timeout` of the steady clock they are false.
     """
 
     def __init__(self, node: Node, params: Params) -> None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-import pytest
 from health.stand_in import ORIGIN
 from health.stand_in import START_US
 from health.stand_in import StandIn
+import pytest
 
 from ekf_fusion_ros.estimator import GeoPoint
 from ekf_fusion_ros.params.health import HealthParams

@@ -253,7 +253,7 @@ def test_a_normal_start():
 
 
 def test_a_failed_yaw_at_take_off():
-    """The compass sits turned by half a turn: the vehicle gains speed where it feels to lose it."""
+    """The compass sits turned by half a turn: the estimate goes south while the fixes go north."""
     flight = Flight()
     bench = flight.bench
     bench.field = matrix_from_euler_321(0.0, 0.0, math.radians(180.0)) @ bench.field

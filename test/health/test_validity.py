@@ -66,6 +66,12 @@ def test_set_again_a_probation_after_the_last_failure(valid, time_us, expected):
     assert judge(valid, time_us) is expected
 
 
+def test_what_was_never_valid_need_not_be_good_for_long(flag):
+    judge(flag, 60 * SECOND, 20.0)
+    assert not judge(flag, 61 * SECOND)
+    assert judge(flag, 61 * SECOND + 1)
+
+
 def test_a_loss_alone_does_not_lengthen_probation(valid):
     judge(valid, 9 * SECOND, 20.0)
     assert valid.probation == 1.0
@@ -144,8 +150,10 @@ def test_what_remains_of_the_probation(flag):
 
 def test_the_parameters_count():
     flag = ValidityFlag(1.0, HealthParams(probation_gain=0.0, takeoff_probation=3.0))
-    judge(flag, 0, 2.0)
-    judge(flag, 50 * SECOND, 2.0)
+    judge(flag, 0, 0.5)
+    assert judge(flag, 2 * SECOND, 0.5)
+    judge(flag, 3 * SECOND, 3.0)
+    judge(flag, 50 * SECOND, 3.0)
     assert flag.probation == 1.0
     flag.take_off()
     assert flag.probation == 3.0
