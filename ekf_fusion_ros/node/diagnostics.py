@@ -22,7 +22,7 @@ TROUBLE = {
     'stalls': 'times busy for long, inputs may be lost: is the computer overloaded?',
 }
 # Roles that need not speak while nothing changes.
-TOLD_ON_CHANGE = ('landed',)
+TOLD_ON_CHANGE = ('landed', 'armed')
 # Why messages are refused while all is well: a vehicle that is slow or parked.
 EXPECTED_REASONS = (BELOW_THRESHOLD,)
 

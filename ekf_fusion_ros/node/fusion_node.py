@@ -41,6 +41,7 @@ from ekf_fusion_ros.node.diagnostics import DiagnosticsPublisher
 from ekf_fusion_ros.node.diagnostics import EstimatorWatch
 from ekf_fusion_ros.node.diagnostics import TopicWatch
 from ekf_fusion_ros.node.intake import Intake
+from ekf_fusion_ros.node.navigation import NavigationPublisher
 from ekf_fusion_ros.node.parameters import declare_parameters
 from ekf_fusion_ros.node.publishers import Publishers
 from ekf_fusion_ros.node.qos import input_qos
@@ -59,6 +60,7 @@ TOPICS = {
     'flow': ('flow', Vector3Stamped),
     'airspeed': ('airspeed', TwistWithCovarianceStamped),
     'landed': ('landed', Bool),
+    'armed': ('armed', Bool),
     'gps_heading': ('gps_heading', PoseWithCovarianceStamped),
     'aux_velocity': ('aux_velocity', TwistWithCovarianceStamped),
 }
@@ -79,6 +81,7 @@ class FusionNode(Node):  # type: ignore[misc]
         self._session = FusionSession(self._params, self._params.node.roles)
         self._intake = Intake(self._params.node.queue_limit)
         self._outputs = Publishers(self, self._params)
+        self._navigation = NavigationPublisher(self, self._params)
         self._diagnostics = DiagnosticsPublisher(self)
         self._estimator_watch = EstimatorWatch()
         self._watches: dict[str, TopicWatch] = {}
@@ -136,6 +139,7 @@ class FusionNode(Node):  # type: ignore[misc]
         deadline = started + period
         while self._intake and time.monotonic() < deadline:
             self._handle(*self._intake.take())
+        self._navigation.publish(self._session.navigation)
         for event in self._session.drain_events():
             self.get_logger().info(f'{event.time_us / 1e6:.3f} s: {event.text}')
 
@@ -150,6 +154,7 @@ class FusionNode(Node):  # type: ignore[misc]
         counts = self._session.statistics()
         reports = [self._estimator_watch.report(
             self._session.health(), self._trouble, len(self._intake))]
+        reports.append(self._navigation.report(self._session))
         reports += [watch.report(counts[role]) for role, watch in self._watches.items()]
         self._diagnostics.publish(reports)
 
