@@ -26,7 +26,9 @@ extras = {
     'geo': ['pygeomag'],
     'ulog': ['pyulog'],
     'test': [
-        'pytest', 'pytest-xdist', 'hypothesis', 'scipy', 'pyproj', 'pymap3d', 'pygeomag', 'pyulog'],
+        'pytest', 'pytest-xdist', 'hypothesis', 'scipy', 'pyproj', 'pymap3d', 'pygeomag',
+        'pyulog',
+    ],
     'dev': [
         'colcon-common-extensions',
         'mypy>=1.15',

@@ -27,7 +27,7 @@ def _kernel_cache() -> str:
 
 
 def _domain() -> str:
-    """Return a DDS domain of this process: tests that run side by side must not hear each other."""
+    """Return a DDS domain of this process, for tests that run side by side."""
     first = int(os.environ.get('ROS_DOMAIN_ID', 1 + os.getpid() % 100))
     worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw'))
     return str(1 + (first - 1 + worker) % 100)
