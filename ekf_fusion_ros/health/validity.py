@@ -16,7 +16,8 @@ class ValidityFlag:
 
     Its behaviour is that of PX4's commander as the description of COM_POS_FS_PROB has it, at any
     rate of steps. Probation follows a loss: what was never valid has lost nothing, so that a
-    vehicle that is in motion at the start need not wait for long. Times in integer microseconds, accuracies 1-sigma in m or m/s.
+    vehicle that is in motion at the start need not wait for long. Times in integer microseconds,
+    accuracies 1-sigma in m or m/s.
     """
 
     def __init__(self, limit: float, params: HealthParams) -> None:
