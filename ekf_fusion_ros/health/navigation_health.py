@@ -76,7 +76,9 @@ class NavigationHealth:
         aids = estimator.aid_statuses
         accuracy = accuracy_of(nav, aids() if nav.dead_reckoning else ())
         took_off = self._was_landed and not on_ground
-        if took_off and armed is not False:
+        # Motion alone is no take-off: a robot drives off again and again.
+        told_so = armed is True or (armed is None and landed is not None)
+        if took_off and told_so:
             for flag in self._flags.values():
                 flag.take_off()
         self._step_test(now_us, nav, estimator, on_ground, armed)

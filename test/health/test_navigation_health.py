@@ -98,6 +98,18 @@ def test_probation_is_long_after_take_off():
     assert one.status.local_position_valid
 
 
+def test_motion_that_is_only_inferred_is_no_take_off():
+    one = StandIn(armed=None)
+    one.run(3.0)
+    one.in_air = True
+    one.once()
+    one.eph = 20.0
+    one.once()
+    one.eph = 1.0
+    one.run(1.2)
+    assert one.status.local_position_valid
+
+
 def test_probation_is_short_on_the_ground():
     one = StandIn(armed=True)
     one.run(3.0)
