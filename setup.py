@@ -25,7 +25,10 @@ extras = {
     'plot': ['matplotlib'],
     'geo': ['pygeomag'],
     'ulog': ['pyulog'],
-    'test': ['pytest', 'hypothesis', 'scipy', 'pyproj', 'pymap3d', 'pygeomag', 'pyulog'],
+    'test': [
+        'pytest', 'pytest-xdist', 'hypothesis', 'scipy', 'pyproj', 'pymap3d', 'pygeomag',
+        'pyulog',
+    ],
     'dev': [
         'colcon-common-extensions',
         'mypy>=1.15',

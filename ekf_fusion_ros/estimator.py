@@ -33,7 +33,8 @@ class NavState:
     body rad/s, bias removed; acceleration (3,) earth, gravity removed. pose_cov (6, 6): position
     NED then small rotations about the earth axes; velocity_cov (3, 3) NED. Covariances are those
     of the fusion horizon. gnss_started: fixes have been fused at least once, so that position is
-    one on the earth.
+    one on the earth. in_air: the vehicle is taken to be off the ground, a rover to be moving.
+    yaw_jump: sum of the resets of yaw since the start, rad.
     """
 
     time_us: int
@@ -51,6 +52,8 @@ class NavState:
     local_position_valid: bool
     global_position_valid: bool
     gnss_started: bool = True
+    in_air: bool = False
+    yaw_jump: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from typing import Any
 
 from ekf_fusion_ros.estimator import Estimator
 from ekf_fusion_ros.messages.decode_airspeed import decode_airspeed
+from ekf_fusion_ros.messages.decode_armed import decode_armed
 from ekf_fusion_ros.messages.decode_aux_velocity import decode_aux_velocity
 from ekf_fusion_ros.messages.decode_fix import decode_fix
 from ekf_fusion_ros.messages.decode_fix import decode_fix_velocity
@@ -27,6 +28,7 @@ from ekf_fusion_ros.messages.decode_pressure import decode_pressure
 from ekf_fusion_ros.messages.decode_range import decode_range
 from ekf_fusion_ros.messages.flat import FlatRows
 from ekf_fusion_ros.roles import AIRSPEED
+from ekf_fusion_ros.roles import ARMED
 from ekf_fusion_ros.roles import AUX_VELOCITY
 from ekf_fusion_ros.roles import FIX
 from ekf_fusion_ros.roles import FIX_VELOCITY
@@ -39,6 +41,7 @@ from ekf_fusion_ros.roles import ODOMETRY
 from ekf_fusion_ros.roles import PRESSURE
 from ekf_fusion_ros.roles import RANGE
 from ekf_fusion_ros.samples import AirspeedSample
+from ekf_fusion_ros.samples import ArmedSample
 from ekf_fusion_ros.samples import AuxVelocitySample
 from ekf_fusion_ros.samples import BaroSample
 from ekf_fusion_ros.samples import FlowSample
@@ -66,6 +69,7 @@ DECODERS: dict[str, Callable[..., Any]] = {
     LANDED: decode_landed,
     GPS_HEADING: decode_gps_heading,
     AUX_VELOCITY: decode_aux_velocity,
+    ARMED: decode_armed,
 }
 
 ROWS_DECODERS: dict[str, Callable[..., Any]] = {
@@ -84,6 +88,7 @@ ROLE_OF_SAMPLE: dict[type, str] = {
     AirspeedSample: AIRSPEED,
     AuxVelocitySample: AUX_VELOCITY,
     LandedSample: LANDED,
+    ArmedSample: ARMED,
     HeadingSample: 'heading',
 }
 

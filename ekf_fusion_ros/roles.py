@@ -26,10 +26,14 @@ AIRSPEED = 'airspeed'
 LANDED = 'landed'
 GPS_HEADING = 'gps_heading'
 AUX_VELOCITY = 'aux_velocity'
+ARMED = 'armed'
 
 SUPPORTED = (
     ODOMETRY, FIX, FIX_VELOCITY, IMU, MAGNETIC_FIELD, PRESSURE, RANGE, FLOW, AIRSPEED, LANDED,
-    GPS_HEADING, AUX_VELOCITY)
+    GPS_HEADING, AUX_VELOCITY, ARMED)
+WITHOUT_STAMP = (LANDED, ARMED)
+"""Roles whose messages act when they come."""
+
 PARTS_OF_FIX = (FIX_VELOCITY, GPS_HEADING)
 """Roles whose messages belong to the fix of the same stamp."""
 

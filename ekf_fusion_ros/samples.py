@@ -183,6 +183,14 @@ class LandedSample:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class ArmedSample:
+    """Whether the vehicle is armed; acts at once, on navigation health alone."""
+
+    time_us: int
+    armed: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class HeadingSample:
     """Heading of the odometry frame against true north, found from motion.
 
@@ -197,5 +205,5 @@ class HeadingSample:
 
 Sample = (
     ImuSample | GnssSample | MagSample | BaroSample | VisionSample | RangeSample | FlowSample
-    | AirspeedSample | AuxVelocitySample | LandedSample | HeadingSample
+    | AirspeedSample | AuxVelocitySample | LandedSample | ArmedSample | HeadingSample
 )

@@ -22,6 +22,7 @@ from ekf_fusion_ros.estimator import HealthLevel
 from ekf_fusion_ros.estimator import NavState
 from ekf_fusion_ros.fix_assembly import FixAssembly
 from ekf_fusion_ros.fused_output import FusedOutput
+from ekf_fusion_ros.health.status import NavigationStatus
 from ekf_fusion_ros.holding import Holding
 from ekf_fusion_ros.inputs import ROLE_OF_SAMPLE
 from ekf_fusion_ros.inputs import InertialInput
@@ -31,16 +32,20 @@ from ekf_fusion_ros.inputs import make_motion_heading
 from ekf_fusion_ros.inputs import rows_decoder_of
 from ekf_fusion_ros.messages.flat import FlatRows
 from ekf_fusion_ros.messages.refusal import Refused
+from ekf_fusion_ros.navigation_watch import NavigationWatch
 from ekf_fusion_ros.odometry_heading import OdometryHeading
 from ekf_fusion_ros.roles import AIRSPEED
+from ekf_fusion_ros.roles import ARMED
 from ekf_fusion_ros.roles import FIX
 from ekf_fusion_ros.roles import IMU
 from ekf_fusion_ros.roles import LANDED
 from ekf_fusion_ros.roles import ODOMETRY
 from ekf_fusion_ros.roles import PARTS_OF_FIX
+from ekf_fusion_ros.roles import WITHOUT_STAMP
 from ekf_fusion_ros.roles import age_limit_us
 from ekf_fusion_ros.roles import configure
 from ekf_fusion_ros.sample_check import check_sample
+from ekf_fusion_ros.samples import ArmedSample
 from ekf_fusion_ros.samples import GnssSample
 from ekf_fusion_ros.samples import ImuSample
 from ekf_fusion_ros.samples import LandedSample
@@ -96,6 +101,7 @@ class FusionSession:
         self._home: GeoPoint | None = None
         self._landed: LandedSample | None = None
         self.milestones: dict[str, int] = {}
+        self._navigation = NavigationWatch(self.params, self.roles, local=self._local)
         self._forget()
 
     def _is_local(self) -> bool:
@@ -206,6 +212,8 @@ class FusionSession:
         if isinstance(sample, GnssSample):
             sample = self._with_height(sample)
             self._fixes.append(sample)
+        if isinstance(sample, (GnssSample, LandedSample, ArmedSample)):
+            self._navigation.note(sample)
         self._estimator.push(sample)
         return []
 
@@ -217,7 +225,7 @@ class FusionSession:
         """Raise Refused for a reading that comes out of order or is worth nothing."""
         if role == self._inertial_role:
             self._judge_inertial_order(role, reading.time_us)
-        elif role != LANDED:
+        elif role not in WITHOUT_STAMP:
             self._aiding_order[role].judge(reading.time_us, self._inertial_order.last)
         if role == AIRSPEED:
             check_airspeed(reading, self.params.ekf2.aiding)
@@ -247,7 +255,11 @@ class FusionSession:
             return self._run(role, sample)
         if role == LANDED:
             self._landed = sample
+            self._navigation.note(sample)
             self._tell_landed()
+            return []
+        if role == ARMED:
+            self._navigation.note(sample)
             return []
         if role == FIX:
             sample = self._with_height(sample)
@@ -295,6 +307,7 @@ class FusionSession:
 
     def _push_fix(self, fix: GnssSample) -> None:
         self._fixes.append(fix)
+        self._navigation.note(fix)
         self._estimator.push(fix)
         if self._motion is None:
             return
@@ -334,6 +347,8 @@ class FusionSession:
             return None
         if self._on_update is not None:
             self._on_update(self._estimator)
+        if imu.time_us >= self._navigation.due_us:
+            self._note(self._navigation.step(imu.time_us, self._estimator))
         # Rows stand at filter updates, so those of any rate are a subset of all updates.
         tick = imu.time_us * self._rate_mhz // 1_000_000_000
         if self._rate_mhz and tick == self._tick:
@@ -366,6 +381,7 @@ class FusionSession:
         self._collect()
         self._resets_before.update(self._estimator.reset_counts())
         self._estimator.reset()
+        self._navigation.restart()
         self._forget()
 
     @property
@@ -390,6 +406,24 @@ class FusionSession:
         if moved:
             self._home = origin
         return moved
+
+    @property
+    def navigation(self) -> NavigationStatus:
+        """What the estimate is good for, and home; judged ten times a second of stamps."""
+        return self._navigation.status
+
+    def navigation_health(self) -> Health:
+        """Say in one sentence what navigation lacks, home above all."""
+        return self._navigation.health(self._estimator.health())
+
+    def set_home(self, point: GeoPoint | None) -> bool:
+        """Set home by hand, to stay; None: to where the vehicle is, by the rules from then on.
+
+        False where the point is unusable, or the present place not known well enough.
+        """
+        done, events = self._navigation.set_home(point)
+        self._note(events)
+        return done
 
     def reset(self) -> None:
         """Start again with the same parameters; counts and events go on."""
@@ -458,8 +492,12 @@ class FusionSession:
         self._events += self._estimator.drain_events()
 
     def _tell(self, time_us: int, text: str) -> None:
-        self._collect()
-        self._events.append(Event(time_us, text))
+        self._note((Event(time_us, text),))
+
+    def _note(self, events: Sequence[Event]) -> None:
+        if events:
+            self._collect()
+            self._events += events
 
     def _count_refusal(self, role: str, reason: str, detail: str) -> None:
         first = self._statistics[role].refuse(reason, detail)

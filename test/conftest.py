@@ -26,9 +26,16 @@ def _kernel_cache() -> str:
     return str(Path(tempfile.gettempdir()) / f'ekf_fusion_ros_numba_{digest.hexdigest()[:16]}')
 
 
+def _domain() -> str:
+    """Return a DDS domain of this process, for tests that run side by side."""
+    first = int(os.environ.get('ROS_DOMAIN_ID', 1 + os.getpid() % 100))
+    worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw'))
+    return str(1 + (first - 1 + worker) % 100)
+
+
 # Before rclpy or numba is imported by any test.
 os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
+os.environ['ROS_DOMAIN_ID'] = _domain()
 os.environ.setdefault('MPLBACKEND', 'Agg')
 os.environ.setdefault('NUMBA_CACHE_DIR', _kernel_cache())
 

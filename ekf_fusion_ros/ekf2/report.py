@@ -74,6 +74,8 @@ def nav_state(ekf: Ekf2) -> NavState:
         local_position_valid=validity.local_position,
         global_position_valid=validity.global_position,
         gnss_started=f.observations.gps_hor_pos.starts > 0,
+        in_air=f.flags.in_air,
+        yaw_jump=ekf.control.resets.counters.yaw_sum,
     )
 
 

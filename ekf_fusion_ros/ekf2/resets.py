@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,7 @@ class ResetCounters:
     def __init__(self) -> None:
         """Start with no resets."""
         self.quat = 0
+        self.yaw_sum = 0.0
         self.vel_ne = 0
         self.vel_d = 0
         self.pos_ne = 0
@@ -84,6 +86,7 @@ class Resets:
         if shift_output:
             f.output.rotate(delta)
         self.counters.d_quat = delta
+        self.counters.yaw_sum += 2.0 * math.atan2(float(delta[3]), float(delta[0]))
         self.counters.quat += 1
 
     def horizontal_velocity(self, velocity: Array, variance: Array) -> None:

@@ -13,7 +13,7 @@ from ekf_fusion_ros.live.report import Report
 from ekf_fusion_ros.statistics import RoleStatistics
 
 # Roles that need not speak while nothing changes.
-TOLD_ON_CHANGE = ('landed',)
+TOLD_ON_CHANGE = ('landed', 'armed')
 # Why messages are refused while all is well: a vehicle that is slow or parked.
 EXPECTED_REASONS = (BELOW_THRESHOLD,)
 

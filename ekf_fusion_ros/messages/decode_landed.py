@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ekf_fusion_ros.messages.refusal import Refused
+from ekf_fusion_ros.messages.fields import truth
 from ekf_fusion_ros.params.messages import MessageParams
 from ekf_fusion_ros.samples import LandedSample
 
@@ -17,7 +17,5 @@ def decode_landed(message: Any, params: MessageParams) -> LandedSample:
     A Bool has no stamp: the sample carries 0, and who takes it decides when it acts. Raises
     Refused for anything but a truth value.
     """
-    if message.data not in (True, False):
-        raise Refused('not_boolean', f'data is {message.data!r}: must be true or false')
-    vehicle = params.landed
-    return LandedSample(NO_STAMP, bool(message.data), vehicle.fixed_wing, vehicle.fuse_sideslip)
+    landed, vehicle = truth(message.data, 'data'), params.landed
+    return LandedSample(NO_STAMP, landed, vehicle.fixed_wing, vehicle.fuse_sideslip)

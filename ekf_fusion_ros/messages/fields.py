@@ -17,6 +17,13 @@ Triple = Sequence[float]
 QUATERNION_NORM_ERROR = 0.1
 
 
+def truth(value: object, name: str) -> bool:
+    """Return a truth value; raises Refused 'not_boolean' for anything else."""
+    if value not in (True, False):
+        raise Refused('not_boolean', f'{name} is {value!r}: must be true or false')
+    return bool(value)
+
+
 def check_vector(vector: Triple, name: str, limit: float) -> None:
     """Raise Refused 'not_finite', or 'out_of_range' when an element is beyond `limit`."""
     x, y, z = vector

@@ -22,6 +22,7 @@ from ekf_fusion_ros.live.work_watch import WorkWatch
 from ekf_fusion_ros.node.guard import Guard
 from ekf_fusion_ros.node.inputs import Inputs
 from ekf_fusion_ros.node.intake import Intake
+from ekf_fusion_ros.node.navigation import NavigationPublisher
 from ekf_fusion_ros.node.parameters import declare_parameters
 from ekf_fusion_ros.node.preparation import Preparation
 from ekf_fusion_ros.node.process import StopRequest
@@ -51,9 +52,10 @@ class FusionNode(Node):  # type: ignore[misc]
         self._guard = Guard(self, self._work.trouble)
         self._switches = Switches(node.roles, self._session.inertial_role, enabled=True)
         self._outputs = Publishers(self, self._params)
+        self._navigation = NavigationPublisher(self, self._params)
         self._inputs = Inputs(self, node, self._queue)
         self._reporting = Reporting(
-            self, self._session, self._inputs, self._switches, self._work,
+            self, self._session, self._inputs, self._switches, self._work, self._navigation,
             lambda: len(self._intake))
         self._preparation: Preparation | None = None
         # Not the ROS clock: the filter runs on stamps, also while /clock stands still.
@@ -112,6 +114,7 @@ class FusionNode(Node):  # type: ignore[misc]
         deadline = started + 1.0 / self._params.node.core_rate
         while self._intake and time.monotonic() < deadline:
             self._handle(*self._intake.take())
+        self._navigation.publish(self._session.navigation)
         for event in self._session.drain_events():
             self.get_logger().info(f'{event.time_us / 1e6:.3f} s: {event.text}')
         self._work.end(time.monotonic())

@@ -42,6 +42,7 @@ TOPICS = {
     'flow': ('flow', Vector3Stamped),
     'airspeed': ('airspeed', TwistWithCovarianceStamped),
     'landed': ('landed', Bool),
+    'armed': ('armed', Bool),
     'gps_heading': ('gps_heading', PoseWithCovarianceStamped),
     'aux_velocity': ('aux_velocity', TwistWithCovarianceStamped),
 }

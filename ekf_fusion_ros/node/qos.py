@@ -12,6 +12,7 @@ from typing import Any
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy
 from rclpy.qos import HistoryPolicy
 from rclpy.qos import QoSProfile
 from rclpy.qos import ReliabilityPolicy
@@ -60,3 +61,10 @@ def publisher_events(node: Node, topic: str) -> PublisherEventCallbacks:
 def _policy(event: Any) -> str:
     """Return the name of the policy in an incompatible-QoS event."""
     return qos_policy_name_from_kind(event.last_policy_kind).lower()
+
+
+def latched_qos() -> QoSProfile:
+    """Return the profile of what changes rarely: a late subscriber gets the latest."""
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST, depth=1, reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL)

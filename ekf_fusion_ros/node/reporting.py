@@ -19,6 +19,7 @@ from ekf_fusion_ros.live.work_watch import EstimatorWatch
 from ekf_fusion_ros.live.work_watch import WorkWatch
 from ekf_fusion_ros.node.diagnostics import DiagnosticsPublisher
 from ekf_fusion_ros.node.inputs import Inputs
+from ekf_fusion_ros.node.navigation import NavigationPublisher
 from ekf_fusion_ros.session import FusionSession
 
 LATE = ('too_old', 'backward_stamp')
@@ -29,13 +30,14 @@ class Reporting:
 
     def __init__(
         self, node: Node, session: FusionSession, inputs: Inputs, switches: Switches,
-        work: WorkWatch, queued: Callable[[], int],
+        work: WorkWatch, navigation: NavigationPublisher, queued: Callable[[], int],
     ) -> None:
         self._node = node
         self._session = session
         self._inputs = inputs
         self._switches = switches
         self._work = work
+        self._navigation = navigation
         self._queued = queued
         self._diagnostics = DiagnosticsPublisher(node)
         self._estimator = EstimatorWatch()
@@ -76,6 +78,7 @@ class Reporting:
         counts = self._session.statistics()
         aids = self._session.estimator.aid_statuses()
         reports = [self._estimator.report(health, self._work.trouble, self._queued())]
+        reports.append(self._navigation.report(self._session))
         for role, watch in self._inputs.watches.items():
             reports.append(watch.report(
                 counts[role], now, aids, self._inputs.delay(role, now, ros_now)))

@@ -124,7 +124,7 @@ def _px4_names(params: Params) -> dict[str, list[str]]:
             names[name] = [spec.px4]
     for name, foreign in _expanded_names():
         known = names.setdefault(name, [])
-        if foreign.startswith('EKF2_') and foreign not in known:
+        if foreign.split()[0].isupper() and foreign not in known:
             known.append(foreign)
     return names
 

@@ -35,6 +35,7 @@ class NodeParams:
         'twist_with_covariance', 'Message of `airspeed`: TwistWithCovarianceStamped or '
         'TwistStamped.', choices=TWIST_TYPES)
     use_landed: bool = param(False, 'Subscribe to `landed` (std_msgs/Bool).')
+    use_armed: bool = param(False, 'Subscribe to `armed` (std_msgs/Bool).')
     use_gps_heading: bool = param(
         False, 'Subscribe to `gps_heading` (heading of a receiver with two antennas).')
     gps_heading_type: str = param(

@@ -14,6 +14,7 @@ import numpy as np
 from ekf_fusion_ros.params.ekf2 import HEIGHT_REFERENCES
 from ekf_fusion_ros.params.ekf2 import MAG_TYPES
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
+from ekf_fusion_ros.params.health import HealthParams
 from ekf_fusion_ros.params.messages import MessageParams
 from ekf_fusion_ros.params.spec import leaves
 
@@ -69,15 +70,23 @@ SWITCHES = {
     'range_aid': 'ekf2.range.aid',
     'EKF2_RNG_AID': 'ekf2.range.aid',
     'EKF2_FUSE_BETA': 'ekf2.air_data.use_sideslip',
+    'COM_ARM_WO_GPS': 'health.arm_without_gps',
 }
 KIND_OF_VEHICLE = 'MAV_TYPE'
-"""The one parameter outside of EKF2 that its flight stack looks at: airspeed, wings, wheels."""
+"""What the flight stack of EKF2 looks at: airspeed, wings, wheels."""
+
+BREAKER, BREAKER_KEY = 'CBRK_VELPOSERR', 201607
+"""Circuit breaker of the take-off test; it breaks at one value only."""
 
 # Of MAVLink's MAV_TYPE. A VTOL is none of these: it flies both ways.
 VEHICLES = {
     1: 'fixed_wing', 2: 'multirotor', 3: 'multirotor', 4: 'multirotor', 10: 'rover',
     13: 'multirotor', 14: 'multirotor', 15: 'multirotor', 29: 'multirotor', 35: 'multirotor',
 }
+HEALTH = HealthParams()
+CONCERNING = {KIND_OF_VEHICLE} | {spec.px4 for _, _, spec in leaves(HEALTH)}
+"""Names outside of EKF2 that mean something here: the vehicle, and the commander's judgement."""
+
 MICROSECONDS = {
     'valid_timeout_max': 'ekf2.aiding.valid_timeout',
     'EKF2_NOAID_TOUT': 'ekf2.aiding.valid_timeout',
@@ -116,6 +125,8 @@ def translate(foreign: Mapping[str, Any], base: Ekf2Params) -> tuple[dict[str, A
             values[SWITCHES[name]] = _whole(name, value) != 0
         elif name == KIND_OF_VEHICLE:
             _choose_vehicle(name, value, values, unused)
+        elif name == BREAKER:
+            values['health.takeoff_test'] = _whole(name, value) != BREAKER_KEY
         elif name in MICROSECONDS:
             values[MICROSECONDS[name]] = _scalar(name, value) * 1e-6
         elif name[:-1] in AXES and name[-1] in 'XYZ':
@@ -132,7 +143,7 @@ def translate(foreign: Mapping[str, Any], base: Ekf2Params) -> tuple[dict[str, A
 
 def _plain_names(base: Ekf2Params) -> dict[str, str]:
     names = SECONDS | MILLISECONDS
-    for tree, prefix in ((base, 'ekf2.'), (MessageParams(), 'messages.')):
+    for tree, prefix in ((base, 'ekf2.'), (MessageParams(), 'messages.'), (HEALTH, 'health.')):
         for name, _, spec in leaves(tree, prefix):
             names.update({foreign: name for foreign in (spec.px4, spec.ecl) if foreign})
     return names
@@ -192,7 +203,7 @@ def _whole(name: str, value: Any) -> int:
 
 def concerns_filter(name: str) -> bool:
     """Return whether a PX4 parameter is one that `translate` knows about."""
-    return name.startswith('EKF2_') or name == KIND_OF_VEHICLE
+    return name.startswith('EKF2_') or name in CONCERNING
 
 
 def read_px4(path: Path) -> tuple[dict[str, float], list[str]]:

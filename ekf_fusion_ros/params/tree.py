@@ -14,6 +14,7 @@ from typing import get_origin
 from typing import get_type_hints
 
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
+from ekf_fusion_ros.params.health import HealthParams
 from ekf_fusion_ros.params.messages import MessageParams
 from ekf_fusion_ros.params.node import NodeParams
 from ekf_fusion_ros.params.session import SessionParams
@@ -34,6 +35,7 @@ class Params:
     ekf2: Ekf2Params = field(default_factory=Ekf2Params)
     messages: MessageParams = field(default_factory=MessageParams)
     session: SessionParams = field(default_factory=SessionParams)
+    health: HealthParams = field(default_factory=HealthParams)
     two_topic: TwoTopicParams = field(default_factory=TwoTopicParams)
     node: NodeParams = field(default_factory=NodeParams)
 

@@ -23,6 +23,7 @@ from ekf_fusion_ros.frames import swap_yaw_enu_ned
 from ekf_fusion_ros.geo.atmosphere import pressure_at
 from ekf_fusion_ros.messages.stamps import seconds_nanoseconds
 from ekf_fusion_ros.samples import AirspeedSample
+from ekf_fusion_ros.samples import ArmedSample
 from ekf_fusion_ros.samples import AuxVelocitySample
 from ekf_fusion_ros.samples import BaroSample
 from ekf_fusion_ros.samples import FlowSample
@@ -79,6 +80,7 @@ class _Messages:
             FlowSample: ('/flow', self._flow),
             AirspeedSample: ('/airspeed', self._airspeed),
             LandedSample: ('/landed', self._landed),
+            ArmedSample: ('/armed', self._armed),
             AuxVelocitySample: ('/aux_velocity', self._aux_velocity),
         }
 
@@ -221,3 +223,6 @@ class _Messages:
 
     def _landed(self, sample: LandedSample) -> Any:
         return self._make('std_msgs/Bool', data=sample.landed)
+
+    def _armed(self, sample: ArmedSample) -> Any:
+        return self._make('std_msgs/Bool', data=sample.armed)

@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING
 from typing import Any
 
 from ekf_fusion_ros.estimator import AidStatus
+from ekf_fusion_ros.health.home import Home
+from ekf_fusion_ros.health.status import NavigationStatus
+from ekf_fusion_ros.messages.encode_home import encode_home
 from ekf_fusion_ros.replay.options import ReplayOptions
 from ekf_fusion_ros.replay.topics import Choice
 from ekf_fusion_ros.session import FusionSession
@@ -45,6 +48,8 @@ def _content(
         'frame': 'local' if session.local else 'map',
         'origin': None if origin is None else {
             'lat': origin.lat, 'lon': origin.lon, 'alt': origin.alt},
+        'home': _home(session.navigation.home),
+        'navigation': _navigation(session.navigation),
         'topics': _topics(session, choice),
         'aid_sources': {aid.name: _aid(aid) for aid in session.estimator.aid_statuses()},
         'events': [{'time': event.time_us / SECOND_US, 'text': event.text}
@@ -65,6 +70,29 @@ def _replayed(options: ReplayOptions, duration: float) -> float:
     """Return how much of the recording, in s, lies between start and end of the options."""
     end = duration if options.end is None else min(options.end, duration)
     return max(end - options.start, 0.0)
+
+
+def _home(home: Home | None) -> dict[str, Any] | None:
+    """Return home on the globe and in the frame of the rows (ENU, rad), as far as known."""
+    if home is None:
+        return None
+    local = encode_home(home)
+    numbers = dict(zip('xyz', local.position, strict=True)) | {'yaw': local.yaw}
+    return {
+        'time': home.time_us / SECOND_US, 'lat': home.lat, 'lon': home.lon, 'alt': home.alt,
+        'manual': home.manual,
+        **{name: number if math.isfinite(number) else None for name, number in numbers.items()}}
+
+
+def _navigation(status: NavigationStatus) -> dict[str, Any]:
+    return {
+        'global_position_valid': status.global_position_valid,
+        'local_position_valid': status.local_position_valid,
+        'local_velocity_valid': status.local_velocity_valid,
+        'takeoff_test': status.takeoff_test.value,
+        'ready': status.ready,
+        'home_text': status.home_text,
+    }
 
 
 def _topics(session: FusionSession, choice: Choice) -> dict[str, Any]:
@@ -108,6 +136,8 @@ def _gist(summary: dict[str, Any]) -> list[str]:
     origin = summary['origin']
     lines = [] if origin is None else [
         f'origin: {origin["lat"]:.7f}, {origin["lon"]:.7f}, {origin["alt"]:.2f} m']
+    if summary['frame'] == 'map':
+        lines.append(summary['navigation']['home_text'])
     if summary['first_output'] is None:
         lines.append('no output: ' + _missing(summary))
     else:

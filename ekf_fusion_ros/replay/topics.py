@@ -24,6 +24,7 @@ TYPES: dict[str, tuple[str, ...]] = {
     roles.AIRSPEED: (
         'geometry_msgs/msg/TwistWithCovarianceStamped', 'geometry_msgs/msg/TwistStamped'),
     roles.LANDED: ('std_msgs/msg/Bool',),
+    roles.ARMED: ('std_msgs/msg/Bool',),
     roles.GPS_HEADING: (
         'geometry_msgs/msg/PoseWithCovarianceStamped', 'geometry_msgs/msg/PoseStamped',
         'sensor_msgs/msg/Imu'),
@@ -40,6 +41,7 @@ NAMES = {
     roles.FLOW: ('flow',),
     roles.AIRSPEED: ('airspeed', 'air_speed', 'pitot'),
     roles.LANDED: ('landed', 'on_ground', 'ground_contact'),
+    roles.ARMED: ('armed',),
     roles.GPS_HEADING: ('heading',),
     roles.AUX_VELOCITY: ('aux_velocity', 'landing_target', 'target_velocity'),
 }

@@ -1,12 +1,14 @@
-"""Land detector."""
+"""Land detector, and the switch that arms the vehicle."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import math
 
 import numpy as np
 
+from ekf_fusion_ros.samples import ArmedSample
 from ekf_fusion_ros.samples import LandedSample
 from ekf_fusion_ros.simulation.sensor import Sensor
 from ekf_fusion_ros.simulation.trajectory import Trajectory
@@ -38,4 +40,22 @@ class GroundContact(Sensor):
         landed = (height < self.height) & still
         stamps = self.stamps(instants, start_us)
         return [LandedSample(stamps[k], bool(landed[k]), self.fixed_wing, self.fuse_beta)
+                for k in np.flatnonzero(self.present(instants))]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arming(Sensor):
+    """Tells that the vehicle is armed from `armed_at` to `disarmed_at` s after the start."""
+
+    rate: float = 2.0
+    armed_at: float = 0.0
+    disarmed_at: float = math.inf
+
+    def measure(
+        self, trajectory: Trajectory, start_us: int, rng: np.random.Generator,
+    ) -> Sequence[ArmedSample]:
+        instants = self.instants_us(trajectory)
+        stamps = self.stamps(instants, start_us)
+        armed = (instants >= 1e6 * self.armed_at) & (instants < 1e6 * self.disarmed_at)
+        return [ArmedSample(stamps[k], bool(armed[k]))
                 for k in np.flatnonzero(self.present(instants))]

@@ -19,6 +19,7 @@ from ekf_fusion_ros.simulation.auxiliary_velocity import AuxiliaryVelocity
 from ekf_fusion_ros.simulation.barometer import Barometer
 from ekf_fusion_ros.simulation.dual_antenna import DualAntennaGnss
 from ekf_fusion_ros.simulation.gnss import Gnss
+from ekf_fusion_ros.simulation.ground_contact import Arming
 from ekf_fusion_ros.simulation.ground_contact import GroundContact
 from ekf_fusion_ros.simulation.imu import Imu
 from ekf_fusion_ros.simulation.magnetometer import Magnetometer
@@ -33,7 +34,10 @@ from ekf_fusion_ros.simulation.vision import Vision
 ORIGIN = GeoPoint(47.397742, 8.545594, 488.0)
 START_US = 1_700_000_000_000_000
 ROLES = ('odometry', 'fix', 'imu', 'magnetic_field', 'pressure')
-FURTHER_ROLES = ('range', 'flow', 'airspeed', 'landed', 'aux_velocity')
+FURTHER_ROLES = ('range', 'flow', 'airspeed', 'landed', 'aux_velocity', 'armed')
+ARMED_AT = 15.0
+"""Time in s at which a simulated vehicle is armed: the estimate has settled by then."""
+
 GPS_HEADING = 'gps_heading'
 """No sensor of its own: a receiver with two antennas tells it with the fix."""
 
@@ -101,6 +105,7 @@ def default_sensors(
         'airspeed': Airspeed(reference=origin.alt),
         'landed': GroundContact(),
         'aux_velocity': AuxiliaryVelocity(),
+        'armed': Arming(armed_at=ARMED_AT),
     }
     return {role: everything[role] for role in roles if role != GPS_HEADING}
 

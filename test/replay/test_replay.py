@@ -60,6 +60,19 @@ def summary(output):
     return json.loads((output / 'summary.json').read_text())
 
 
+def test_summary_has_home_and_how_it_came_to_be(replayed, flight):
+    told = summary(replayed)
+    home, origin = told['home'], flight[1].origin
+    # One fix of 1.3 m, seen after the ten seconds of the checks.
+    assert home['lat'] == pytest.approx(origin.lat, abs=3e-4)
+    assert home['time'] > told['start'] + 10.0
+    assert not home['manual']
+    texts = [event['text'] for event in told['events']]
+    assert 'global position valid' in texts
+    assert any(text.startswith('home set: ') for text in texts)
+    assert told['navigation']['global_position_valid'] is True
+
+
 def run(recording, output, *arguments):
     return main([str(recording), '--output', str(output), '--no-bag', *arguments])
 

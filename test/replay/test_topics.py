@@ -61,8 +61,9 @@ def test_further_roles_stay_out_until_asked_for_and_it_is_said_how():
     choice = choose(FURTHER)
     assert names(choice) == {'imu': '/imu', 'fix': '/fix'}
     hints = [line.rsplit(' ', 1)[-1] for line in choice.remarks]
-    assert hints == ['range=/lidar', 'flow=/px4flow', 'airspeed=/airspeed', 'landed=/landed',
-                     'aux_velocity=/landing_target/velocity', 'gps_heading=/gps/heading']
+    assert hints == ['range=/lidar', 'flow=/px4flow', 'airspeed=/airspeed', 'armed=/armed',
+                     'landed=/landed', 'aux_velocity=/landing_target/velocity',
+                     'gps_heading=/gps/heading']
 
 
 def test_further_roles_by_name():

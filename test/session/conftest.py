@@ -132,6 +132,10 @@ class Build:
     def landed(landed=True):
         return SimpleNamespace(data=landed)
 
+    @staticmethod
+    def armed(armed=True):
+        return SimpleNamespace(data=armed)
+
     def gps_heading(self, t, yaw=0.25):
         orientation = SimpleNamespace(
             w=math.cos(0.5 * yaw), x=0.0, y=0.0, z=math.sin(0.5 * yaw))
