@@ -35,8 +35,7 @@ class Switches:
         return role not in self._off and not (role in PARTS_OF_FIX and FIX in self._off)
 
     def refusal(self, role: str) -> tuple[str, str] | None:
-        """Return reason and sentence why a message of a role is kept back, None where it is not.
-        """
+        """Return reason and sentence why a message of a role is kept back, None if it is not."""
         if not self.enabled:
             return DISABLED
         if self.is_on(role):

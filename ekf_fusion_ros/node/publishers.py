@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from builtin_interfaces.msg import Time
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
@@ -17,6 +19,7 @@ from ekf_fusion_ros.messages.encode import encode_gnss_odometry
 from ekf_fusion_ros.messages.encode import encode_odometry
 from ekf_fusion_ros.messages.stamps import seconds_nanoseconds
 from ekf_fusion_ros.node.qos import output_qos
+from ekf_fusion_ros.node.qos import publisher_events
 from ekf_fusion_ros.params.tree import Params
 
 
@@ -24,14 +27,16 @@ class Publishers:
     """`odometry/filtered`, `odometry/gps` and `gps/filtered` from fused outputs."""
 
     def __init__(self, node: Node, params: Params) -> None:
-        overridable = QoSOverridingOptions.with_default_policies()
+        def publisher(kind: type, name: str) -> Any:
+            return node.create_publisher(
+                kind, name, output_qos(),
+                event_callbacks=publisher_events(node, node.resolve_topic_name(name)),
+                qos_overriding_options=QoSOverridingOptions.with_default_policies())
+
         self._params = params
-        self._odometry = node.create_publisher(
-            Odometry, 'odometry/filtered', output_qos(), qos_overriding_options=overridable)
-        self._gps = node.create_publisher(
-            Odometry, 'odometry/gps', output_qos(), qos_overriding_options=overridable)
-        self._fix = node.create_publisher(
-            NavSatFix, 'gps/filtered', output_qos(), qos_overriding_options=overridable)
+        self._odometry = publisher(Odometry, 'odometry/filtered')
+        self._gps = publisher(Odometry, 'odometry/gps')
+        self._fix = publisher(NavSatFix, 'gps/filtered')
 
     def publish(self, output: FusedOutput) -> None:
         """Publish one output and the fixes that came with it.
