@@ -15,8 +15,8 @@ from ekf_fusion_ros.kernels.body_velocity import Three
 from ekf_fusion_ros.kernels.body_velocity import fuse_body_velocity
 from ekf_fusion_ros.kernels.compile import kernel
 from ekf_fusion_ros.kernels.heading import apply_yaw
+from ekf_fusion_ros.kernels.magnetic import correct_by_field
 from ekf_fusion_ros.kernels.magnetic import fuse_declination
-from ekf_fusion_ros.kernels.magnetic import fuse_field
 from ekf_fusion_ros.kernels.period import predict
 from ekf_fusion_ros.kernels.prediction import GRAVITY
 from ekf_fusion_ros.kernels.prediction import PROCESS
@@ -161,22 +161,21 @@ class Covariance:
             self.p, x, measured, noise, gate, self.limits)
         return outcome
 
-    def fuse_field(
-        self, x: Array, innovation: Array, axes: int, noise: float, all_states: bool,
-        declination: float, shortest: float, variance: Array,
-    ) -> tuple[int, int, int]:
-        """Correct with the first magnetometer axes; see kernels.magnetic.fuse_field."""
-        outcome: tuple[int, int, int] = fuse_field(
-            x, self.p, innovation, axes, noise, all_states, declination, shortest, self.limits,
-            variance)
+    def correct_by_field(
+        self, x: Array, measured: Array, axes: int, noise: float, gate: float, all_states: bool,
+        declination: float, shortest: float,
+    ) -> tuple[bool, Three, Three, Three, tuple[int, int, int]]:
+        """Gate and fuse the first magnetometer axes; see kernels.magnetic.correct_by_field."""
+        outcome: tuple[bool, Three, Three, Three, tuple[int, int, int]] = correct_by_field(
+            x, self.p, measured, axes, noise, gate, all_states, declination, shortest, self.limits)
         return outcome
 
     def fuse_declination(
-        self, x: Array, declination: float, noise: float,
+        self, x: Array, wanted: float, noise: float, declination: float, shortest: float,
     ) -> tuple[float, float, int]:
         """Correct with the declination; see kernels.magnetic.fuse_declination."""
         outcome: tuple[float, float, int] = fuse_declination(
-            x, self.p, declination, noise, self.limits)
+            x, self.p, wanted, noise, declination, shortest, self.limits)
         return outcome
 
     def decorrelate(self, first: int, size: int) -> None:

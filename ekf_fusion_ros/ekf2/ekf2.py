@@ -106,19 +106,21 @@ class Ekf2:
         raw, self._raw = self._raw, None
         if raw is None:
             return False
-        f = self.filter
-        complete = self.inertial.add(raw, f.flags.in_air, f.output, f.x, f.dt_avg)
+        f, inertial = self.filter, self.inertial
+        complete = inertial.add(raw, f.flags.in_air, f.output, f.x, f.dt_avg)
         f.t_now = raw.time_us
-        f.dt_imu_avg = self.inertial.dt_avg
-        f.flags.vehicle_at_rest = self.inertial.at_rest
+        if not complete and self.initialised:
+            return False
+        f.dt_imu_avg = inertial.dt_avg
+        f.flags.vehicle_at_rest = inertial.at_rest
         if complete:
-            f.t_horizon = self.inertial.ring[0].time_us
-            self.control.drag.add(raw)
+            f.t_horizon = inertial.ring[0].time_us
+            if self.control.drag.enabled:
+                self.control.drag.add(raw)
         if not self.initialised:
             return self._start(raw, complete)
-        if complete:
-            self._advance(raw)
-        return complete
+        self._advance(raw)
+        return True
 
     def _start(self, raw: ImuSample, complete: bool) -> bool:
         """Align with what there is; True when that has begun with a complete filter period."""

@@ -31,9 +31,9 @@ class OutputPredictor:
 
     def __init__(self, params: OutputParams, history: int) -> None:
         """Keep as many periods of history as the fusion horizon is delayed."""
-        self._vel_tau, self._pos_tau = params.vel_tau, params.pos_tau
         self.state = np.zeros(1, OUTPUT)
         output = self.state[0]
+        output['taus'] = params.vel_tau, params.pos_tau
         self.now: Array = output['now']
         self.now[0] = 1.0
         self.rot: Array = output['rot']
@@ -41,8 +41,6 @@ class OutputPredictor:
         self.yaw: Array = output['yaw']
         self.tracking_error: Array = output['tracking_error']
         self._history = np.zeros((history, 10))
-        self._size = history
-        self._pushed = 0
 
     def align(self, x: Array) -> None:
         """Start from the filter state (24,)."""
@@ -63,15 +61,10 @@ class OutputPredictor:
         The state of the filter lies `delay` s in the past. The yaw bank advances by the period at
         the horizon; airspeed m/s, 0 = unknown.
         """
-        pushed, size = self._pushed, self._size
-        self._pushed += 1
-        oldest = (pushed + 1) % size if pushed + 1 >= size else 0
-        dt_imu_avg, dt_avg = f.dt_imu_avg, f.dt_avg
         finish_period(
-            self.state, self._history, pushed % size, oldest, f.x, imu.delta_angle,
-            imu.delta_velocity, imu.delta_angle_dt, imu.delta_velocity_dt, dt_imu_avg / dt_avg,
-            0.5 * dt_imu_avg / max(delay, dt_imu_avg), dt_avg / max(self._vel_tau, dt_avg),
-            dt_avg / max(self._pos_tau, dt_avg), bank.models, f.imu.increments, airspeed)
+            self.state, self._history, f.x, imu.delta_angle, imu.delta_velocity,
+            imu.delta_angle_dt, imu.delta_velocity_dt, f.dt_imu_avg, f.dt_avg, delay, bank.models,
+            f.imu.increments, airspeed)
 
     def velocity_at_origin(self, imu_position: Array) -> Array:
         """Return the velocity (3,) of the body origin, given the IMU position (3,) in the body."""

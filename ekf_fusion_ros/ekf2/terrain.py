@@ -70,7 +70,7 @@ class Terrain:
             return
         north, east, dt = f.x.item(VN), f.x.item(VE), f.imu.increments.item(7)
         growth = dt * dt * (self._drift_var + self._slope_var * (north * north + east * east))
-        self.variance = min(max(self.variance + growth, 0.0), VARIANCE_MAX)
+        self.variance = min(self.variance + growth, VARIANCE_MAX)
 
     def keep_below(self) -> None:
         """Keep the ground below the vehicle."""

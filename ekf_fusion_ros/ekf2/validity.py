@@ -15,23 +15,21 @@ class Validity:
         """Act on a filter."""
         self._f = f
         self._exceeded = True
+        self._timeout_us = round(f.params.aiding.valid_timeout * SECOND)
 
     def step(self) -> None:
         """Run once per filter period, last."""
         f = self._f
-        times, flags = f.times, f.flags
-        newest = max(times.hor_pos, times.hor_vel)
+        times, flags, oldest = f.times, f.flags, f.t_now - AIDING_RECENT_US
         aided = ((flags.gps or flags.ev_pos or flags.ev_vel)
-                 and f.recent(newest, AIDING_RECENT_US))
-        flow_aided = flags.opt_flow and f.recent(times.flow, AIDING_RECENT_US)
-        air_aided = (flags.wind and f.recent(times.airspeed, AIDING_RECENT_US)
-                     and f.recent(times.sideslip, AIDING_RECENT_US))
+                 and (times.hor_pos > oldest or times.hor_vel > oldest))
+        flow_aided = flags.opt_flow and times.flow > oldest
+        air_aided = flags.wind and times.airspeed > oldest and times.sideslip > oldest
         f.wind_dead_reckoning = air_aided and not aided and not flow_aided
         f.dead_reckoning = not aided and not flow_aided and not air_aided
         if not f.dead_reckoning:
-            f.last_aiding_us = f.t_now - AIDING_RECENT_US
-        timeout = round(f.params.aiding.valid_timeout * SECOND)
-        self._exceeded = f.last_aiding_us == 0 or f.late(f.last_aiding_us, timeout)
+            f.last_aiding_us = oldest
+        self._exceeded = f.last_aiding_us == 0 or f.late(f.last_aiding_us, self._timeout_us)
 
     @property
     def local_position(self) -> bool:

@@ -22,12 +22,16 @@ ties of this sum, and agreement with the reference filter needs the same ties.""
 INERTIAL = np.dtype([
     ('quat', 'f8', (4,)), ('velocity', 'f8', (3,)), ('clock', 'f4', (2,)), ('sums', 'f8', (1,)),
     ('period', 'f8', (8,)), ('previous', 'f8', (6,)), ('vibration', 'f8', (3,)),
-    ('limits', 'f8', (3,))])
-"""What down-sampling and vibration metrics keep between raw samples, the last complete period, and
-the limits of rest: angle vibration in rad, velocity vibration in m/s, rate in rad/s."""
+    ('limits', 'f8', (3,)), ('mean_dt', 'f8', (1,)), ('times', 'i8', (3,))])
+"""What down-sampling and vibration metrics keep between raw samples; the last complete period; the
+limits of rest: angle vibration in rad, velocity vibration in m/s, rate in rad/s; mean interval of
+raw samples in s; times of the last sample, motion and vibration in us."""
 
-COMPLETE = 1
-MOVED = 2
+LAST, LAST_MOTION, LAST_VIBRATION = 0, 1, 2
+"""Entries of `times`."""
+
+DT_MIN = 1e-4
+DT_MAX = 0.02
 
 ADJUST_GAIN = np.float32(0.01)
 ADJUST_LIMIT = TARGET_DT / np.float32(2.0)
@@ -88,26 +92,29 @@ def accumulate_imu(
 
 @kernel
 def take_imu(
-    state: NDArray[np.void], delta_angle: Array, delta_velocity: Array, angle_dt: float,
-    velocity_dt: float, dt: float,
-) -> int:
+    state: NDArray[np.void], time_us: int, delta_angle: Array, delta_velocity: Array,
+    angle_dt: float, velocity_dt: float, in_air: bool,
+) -> bool:
     """Run update_vibration and accumulate_imu on one raw sample; state is one INERTIAL.
 
-    Returns COMPLETE where the sample completed a filter period, plus MOVED where vibration or the
-    turn over dt in s exceed the limits of rest.
+    Motion is any flight, vibration or turn beyond the limits of rest. True where the sample
+    completed a filter period.
     """
     s = state[0]
-    metrics, limits = s['vibration'], s['limits']
+    metrics, limits, times = s['vibration'], s['limits'], s['times']
+    dt = min(max(1e-6 * (time_us - times[LAST]), DT_MIN), DT_MAX)
+    times[LAST] = time_us
+    s['mean_dt'][0] = 0.8 * s['mean_dt'][0] + 0.2 * dt
     update_vibration(delta_angle, delta_velocity, s['previous'], metrics)
     ax, ay, az = three(delta_angle)
     turned = math.sqrt(ax * ax + ay * ay + az * az)
-    word = 0
     if metrics[1] > limits[0] or metrics[2] > limits[1] or turned > limits[2] * dt:
-        word += MOVED
-    if accumulate_imu(delta_angle, delta_velocity, angle_dt, velocity_dt, s['quat'],
-                      s['velocity'], s['clock'], s['sums'], s['period']):
-        word += COMPLETE
-    return word
+        times[LAST_MOTION] = time_us
+        times[LAST_VIBRATION] = time_us
+    elif in_air:
+        times[LAST_MOTION] = time_us
+    return accumulate_imu(delta_angle, delta_velocity, angle_dt, velocity_dt, s['quat'],
+                          s['velocity'], s['clock'], s['sums'], s['period'])
 
 
 @kernel

@@ -64,20 +64,6 @@ def field_jacobian(x: Array, axis: int, h: Array) -> float:
 
 
 @kernel
-def predict_field(
-    x: Array, p: Array, measured: Array, noise: float, gate: float, innovation: Array,
-) -> tuple[Three, Three, Three]:
-    """Fill innovation (3,) in Gauss; return it, its variance in Gauss^2 and the test ratio."""
-    h, hp, variance, ratio = np.empty(24), np.empty(24), np.empty(3), np.empty(3)
-    for axis in range(3):
-        innovation[axis] = field_jacobian(x, axis, h) - measured[axis]
-        variance[axis] = project(p, h, hp) + noise
-        ratio[axis] = test_ratio(innovation[axis], variance[axis], gate)
-    return ((innovation[0], innovation[1], innovation[2]),
-            (variance[0], variance[1], variance[2]), (ratio[0], ratio[1], ratio[2]))
-
-
-@kernel
 def fuse_field_axis(
     x: Array, p: Array, axis: int, innovation: float, noise: float, all_states: bool,
     limits: Array, variance: Array,
@@ -148,10 +134,42 @@ def fuse_field(
 
 
 @kernel
+def correct_by_field(
+    x: Array, p: Array, measured: Array, axes: int, noise: float, gate: float, all_states: bool,
+    declination: float, shortest: float, limits: Array,
+) -> tuple[bool, Three, Three, Three, tuple[int, int, int]]:
+    """Gate measured (3,) in Gauss and fuse its first axes together, or none of them.
+
+    Returns whether it could be judged (no innovation variance below the noise), innovations in
+    Gauss, their variances in Gauss^2, test ratios, and what fuse_field_axis said of each axis.
+    """
+    innovation, h, hp = np.zeros(3), np.empty(24), np.empty(24)
+    variance, ratio = np.empty(3), np.zeros(3)
+    fit, passes, first, second, third = True, True, 0, 0, 0
+    for axis in range(3):
+        value = field_jacobian(x, axis, h) - measured[axis]
+        variance[axis] = project(p, h, hp) + noise
+        fit = fit and variance[axis] >= noise
+        if axis < axes:
+            innovation[axis] = value
+            ratio[axis] = test_ratio(value, variance[axis], gate)
+            passes = passes and ratio[axis] <= 1.0
+    if not fit:
+        first, second, third = variance[0] < noise, variance[1] < noise, variance[2] < noise
+    elif passes:
+        first, second, third = fuse_field(
+            x, p, innovation, axes, noise, all_states, declination, shortest, limits, variance)
+    return (fit, (innovation[0], innovation[1], innovation[2]),
+            (variance[0], variance[1], variance[2]), (ratio[0], ratio[1], ratio[2]),
+            (first, second, third))
+
+
+@kernel
 def fuse_declination(
-    x: Array, p: Array, wanted: float, noise: float, limits: Array,
+    x: Array, p: Array, wanted: float, noise: float, declination: float, shortest: float,
+    limits: Array,
 ) -> tuple[float, float, int]:
-    """Fuse a declination in rad with a noise variance in rad^2, in place.
+    """Fuse a wanted declination in rad with a noise variance in rad^2, in place; see limit_field.
 
     Returns the innovation, clipped to DECLINATION_SPREAD, its variance, and 0 = done, 1 = variance
     not above the noise, 2 = P unhealthy.
@@ -167,9 +185,9 @@ def fuse_declination(
     for k in range(3):
         if limits[k] != 0.0:
             gain[13 + k] = 0.0
-    if apply_update(p, x, gain, hp, innovation, limits):
-        return innovation, variance, 0
-    return innovation, variance, 2
+    healthy = apply_update(p, x, gain, hp, innovation, limits)
+    limit_field(x, declination, shortest)
+    return innovation, variance, 0 if healthy else 2
 
 
 @kernel

@@ -25,8 +25,9 @@ Array = NDArray[np.float64]
 OUTPUT = np.dtype([
     ('now', 'f8', (10,)), ('rot', 'f8', (3, 3)), ('correction', 'f8', (3,)), ('yaw', 'f8', (2,)),
     ('rate', 'f8', (3,)), ('integral', 'f8', (6,)), ('tracking_error', 'f8', (3,)),
-    ('running', 'f8')])
-"""What the output predictor keeps beside its history; it runs once it has been aligned."""
+    ('running', 'f8'), ('taus', 'f8', (2,)), ('periods', 'i8', (1,))])
+"""What the output predictor keeps beside its history: its state and what corrects it, the time
+constants of velocity and position in s, the periods so far. It runs once it has been aligned."""
 
 
 @kernel
@@ -43,13 +44,23 @@ def propagate_predictor(
 
 @kernel
 def correct_predictor(
-    state: NDArray[np.void], history: Array, newest: int, oldest: int, x: Array, att_gain: float,
-    vel_gain: float, pos_gain: float,
+    state: NDArray[np.void], history: Array, x: Array, dt_imu_avg: float, dt_avg: float,
+    delay: float,
 ) -> None:
-    """Add the present of one OUTPUT to the history and run correct_output on it."""
+    """Add the present of one OUTPUT to the history and run correct_output on it.
+
+    The filter state x (24,) lies delay s in the past; dt_imu_avg, dt_avg: mean interval of raw
+    samples and mean filter period in s.
+    """
     s = state[0]
+    periods, size = s['periods'], len(history)
+    newest = periods[0] % size
+    periods[0] += 1
+    oldest = periods[0] % size if periods[0] >= size else 0
     history[newest, :] = s['now']
-    correct_output(s['now'], history, oldest, x, s['integral'], att_gain, vel_gain, pos_gain,
+    correct_output(s['now'], history, oldest, x, s['integral'],
+                   0.5 * dt_imu_avg / max(delay, dt_imu_avg),
+                   dt_avg / max(s['taus'][0], dt_avg), dt_avg / max(s['taus'][1], dt_avg),
                    s['correction'], s['tracking_error'])
 
 

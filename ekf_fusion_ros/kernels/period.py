@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.kernels.compile import kernel
-from ekf_fusion_ros.kernels.inertial import COMPLETE
 from ekf_fusion_ros.kernels.inertial import take_imu
 from ekf_fusion_ros.kernels.output import correct_predictor
 from ekf_fusion_ros.kernels.output import propagate_predictor
@@ -27,19 +26,19 @@ OBSERVABLE_COS = 0.8
 
 @kernel
 def take_raw(
-    inertial: Record, output: Record, x: Array, delta_angle: Array, delta_velocity: Array,
-    angle_dt: float, velocity_dt: float, dt: float, bias_scale: float,
-) -> int:
+    inertial: Record, output: Record, x: Array, time_us: int, delta_angle: Array,
+    delta_velocity: Array, angle_dt: float, velocity_dt: float, dt_avg: float, in_air: bool,
+) -> bool:
     """Take a raw sample; unless it completes a filter period, carry the output over it.
 
-    The output of a sample that completes a period waits for the update of the filter
-    (finish_period). Returns the word of take_imu; see there and propagate_predictor.
+    dt_avg mean filter period in s. The output of a sample that completes a period waits for the
+    update of the filter (finish_period). True where it did; see take_imu and propagate_predictor.
     """
-    word = take_imu(inertial, delta_angle, delta_velocity, angle_dt, velocity_dt, dt)
-    if word & COMPLETE == 0:
-        propagate_predictor(output, delta_angle, delta_velocity, angle_dt, velocity_dt, x,
-                            bias_scale)
-    return word
+    if take_imu(inertial, time_us, delta_angle, delta_velocity, angle_dt, velocity_dt, in_air):
+        return True
+    propagate_predictor(output, delta_angle, delta_velocity, angle_dt, velocity_dt, x,
+                        inertial[0]['mean_dt'][0] / dt_avg)
+    return False
 
 
 @kernel
@@ -99,14 +98,16 @@ def select_accel_biases(
 
 @kernel
 def finish_period(
-    output: Record, history: Array, newest: int, oldest: int, x: Array, delta_angle: Array,
-    delta_velocity: Array, angle_dt: float, velocity_dt: float, bias_scale: float,
-    att_gain: float, vel_gain: float, pos_gain: float, bank: Record, imu: Array, airspeed: float,
+    output: Record, history: Array, x: Array, delta_angle: Array, delta_velocity: Array,
+    angle_dt: float, velocity_dt: float, dt_imu_avg: float, dt_avg: float, delay: float,
+    bank: Record, imu: Array, airspeed: float,
 ) -> None:
     """Carry the output over the raw sample that completed the period and correct it.
 
-    The models of the yaw bank, one BANK, advance over the period imu (8,) at the horizon.
+    See correct_predictor. The models of the yaw bank, one BANK, advance over the period imu (8,)
+    at the horizon.
     """
-    propagate_predictor(output, delta_angle, delta_velocity, angle_dt, velocity_dt, x, bias_scale)
-    correct_predictor(output, history, newest, oldest, x, att_gain, vel_gain, pos_gain)
+    propagate_predictor(output, delta_angle, delta_velocity, angle_dt, velocity_dt, x,
+                        dt_imu_avg / dt_avg)
+    correct_predictor(output, history, x, dt_imu_avg, dt_avg, delay)
     advance_bank(bank, imu, airspeed)

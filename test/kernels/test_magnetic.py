@@ -16,12 +16,12 @@ from oracles import seeds
 from oracles import vectors
 import pytest
 
+from ekf_fusion_ros.kernels.magnetic import correct_by_field
 from ekf_fusion_ros.kernels.magnetic import field_jacobian
 from ekf_fusion_ros.kernels.magnetic import fuse_field
 from ekf_fusion_ros.kernels.magnetic import fuse_field_axis
 from ekf_fusion_ros.kernels.magnetic import limit_field
 from ekf_fusion_ros.kernels.magnetic import low_pass
-from ekf_fusion_ros.kernels.magnetic import predict_field
 
 NOISE = 0.05 ** 2
 ALL_FREE = np.array((0.0, 0.0, 0.0, 1.0, 1.0, 1.0))
@@ -51,13 +51,16 @@ def test_gradient_of_each_axis(q, earth, body):
 @given(seed=seeds(), q=quaternions(), measured=vectors(3, 0.5))
 def test_innovation_and_its_variance(seed, q, measured):
     x, p = state(q, np.array((0.2, 0.05, 0.43)), np.array((0.02, -0.01, 0.0))), covariance(seed)
-    innovation = np.empty(3)
-    told, variance, ratio = predict_field(x, p, measured, NOISE, 3.0, innovation)
-    np.testing.assert_allclose(ratio, innovation ** 2 / (9.0 * np.array(variance)), rtol=1e-12)
-    np.testing.assert_array_equal(told, innovation)
+    before, gate, measured = p.copy(), 3.0, measured + 1e6
+    fit, innovation, variance, ratio, outcome = correct_by_field(
+        x, p, measured, 3, NOISE, gate, True, 0.24, 1e-3, ALL_FREE)
+    assert fit and outcome == (0, 0, 0)
+    np.testing.assert_allclose(ratio, np.square(innovation) / (gate ** 2 * np.array(variance)),
+                               rtol=1e-9)
     h = difference(field_in_body, x, 1e-2)
-    np.testing.assert_allclose(innovation, field_in_body(x) - measured, atol=1e-14)
+    np.testing.assert_allclose(innovation, field_in_body(x) - measured, rtol=1e-15)
     np.testing.assert_allclose(variance, np.diag(h @ p @ h.T) + NOISE, rtol=1e-9)
+    np.testing.assert_array_equal(p, before)
 
 
 @pytest.mark.parametrize('axis', [0, 1, 2])

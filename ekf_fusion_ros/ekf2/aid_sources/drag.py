@@ -54,9 +54,7 @@ class Drag:
         self._hp, self._force = np.zeros(24), np.zeros(2)
 
     def add(self, imu: ImuSample) -> None:
-        """Take the raw sample that completed a filter period."""
-        if not self.enabled:
-            return
+        """Take the raw sample that completed a filter period; only where drag is enabled."""
         self._sum[0] += float(imu.delta_velocity[0])
         self._sum[1] += float(imu.delta_velocity[1])
         self._sum[2] += imu.delta_velocity_dt

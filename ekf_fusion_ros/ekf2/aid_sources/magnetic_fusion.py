@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.state import EARTH_FIELD
-from ekf_fusion_ros.kernels.magnetic import limit_field
-from ekf_fusion_ros.kernels.magnetic import predict_field
 
 Array = NDArray[np.float64]
 
@@ -36,34 +34,20 @@ def declination(f: Filter) -> float:
 def fuse_three_axes(f: Filter, measured: Array, all_states: bool) -> bool:
     """Gate the three axes together and fuse them one by one; False where nothing was fused."""
     params = f.params.mag
-    noise = max(params.noise, 1e-3) ** 2
-    innovation = np.empty(3)
-    innovations, variances, (x, y, z) = predict_field(
-        f.x, f.cov.p, measured, noise, params.gate, innovation)
-    faults = f.faults
-    if min(variances) < noise:
-        faults.mag_x, faults.mag_y, faults.mag_z = (s < noise for s in variances)
-        _restart_field_covariance(f)
-        return False
-    if f.flags.synthetic_mag_z:
-        innovations, z = (*innovations[0:2], 0.0), 0.0
-    f.observations.yaw.test_ratio = 0.0
-    rejections = f.rejections
-    rejections.mag_x, rejections.mag_y, rejections.mag_z = x > 1.0, y > 1.0, z > 1.0
-    rejections.mag_judged_after_height = True
-    record = f.observations.mag
-    if not record.judge(f.t_now, innovations, variances, max(x, y, z)):
-        faults.mag_x = faults.mag_y = faults.mag_z = False
-        return False
-    variance = np.array(variances)
-    outcome = f.cov.fuse_field(f.x, innovation, 2 if f.flags.synthetic_mag_z else 3, noise,
-                               all_states, table_declination(f), shortest_field(f), variance)
+    fit, innovations, variances, (x, y, z), outcome = f.cov.correct_by_field(
+        f.x, measured, 2 if f.flags.synthetic_mag_z else 3, max(params.noise, 1e-3) ** 2,
+        params.gate, all_states, table_declination(f), shortest_field(f))
+    faults, rejections = f.faults, f.rejections
     first, second, third = outcome
     faults.mag_x, faults.mag_y, faults.mag_z = first != 0, second != 0, third != 0
     if VARIANCE_TOO_SMALL in outcome:
         _restart_field_covariance(f)
-    record.variance[:] = variance.tolist()
-    return True
+    if not fit:
+        return False
+    f.observations.yaw.test_ratio = 0.0
+    rejections.mag_x, rejections.mag_y, rejections.mag_z = x > 1.0, y > 1.0, z > 1.0
+    rejections.mag_judged_after_height = True
+    return f.observations.mag.judge(f.t_now, innovations, variances, max(x, y, z))
 
 
 def _restart_field_covariance(f: Filter) -> None:
@@ -76,12 +60,12 @@ def fuse_declination(f: Filter, sigma: float) -> None:
     """Fuse atan2(east, north) of the earth field with a sigma in rad."""
     if abs(f.x.item(16)) < MIN_FIELD * 1e-3:
         return
-    innovation, variance, outcome = f.cov.fuse_declination(f.x, declination(f), sigma * sigma)
+    innovation, variance, outcome = f.cov.fuse_declination(
+        f.x, declination(f), sigma * sigma, table_declination(f), shortest_field(f))
     f.faults.declination = outcome != 0
     if outcome == VARIANCE_TOO_SMALL:
         return
     f.observations.declination.judge(f.t_now, (innovation,), (variance,), 0.0)
-    limit_field(f.x, table_declination(f), shortest_field(f))
 
 
 def shortest_field(f: Filter) -> float:

@@ -199,14 +199,15 @@ class Magnetometer:
         f = self._f
         gate = f.params.mag.acceleration_gate
         needed = gate if self._yaw_observable else 2.0 * gate
-        acceleration = math.hypot(f.accel_lpf[0], f.accel_lpf[1])
+        acceleration = math.hypot(*f.accel_lpf[0:2].tolist())
         self._yaw_observable = acceleration > needed and (f.flags.gps or f.flags.ev_pos)
+        turned, turn_rate = f.output.yaw.tolist()
         rate_gate = f.params.mag.yaw_rate_gate
         if not self._bias_observable:
-            self._bias_observable = abs(f.output.yaw[1]) > rate_gate
+            self._bias_observable = abs(turn_rate) > rate_gate
         else:
             elapsed = 1e-6 * (f.t_horizon - self._yaw_started_us)
-            self._bias_observable = abs(f.output.yaw[0]) > 0.5 * rate_gate * elapsed
+            self._bias_observable = abs(turned) > 0.5 * rate_gate * elapsed
         f.output.yaw[0] = 0.0
         self._yaw_started_us = f.t_horizon
         if self._yaw_observable or self._bias_observable:
