@@ -30,7 +30,8 @@ JOINS: dict[str, Callable[..., GnssSample]] = {
 class FixAssembly:
     """A chain of pairings: what leaves one goes into the next, fixes stay in order.
 
-    With no such topic in use a fix passes at once.
+    With no such topic in use a fix passes at once. `waiting` while a fix or a part of one waits
+    for its partner.
     """
 
     def __init__(
@@ -46,20 +47,16 @@ class FixAssembly:
         self._stages = [role for role in JOINS if role in roles]
         self._pairings = [FixPairing(statistics[role], tolerance_us, wait_us, JOINS[role])
                           for role in self._stages]
+        self.waiting = False
 
     def push_fix(self, fix: GnssSample) -> Sequence[GnssSample]:
         """Return the fixes that are complete, or will stay as they are."""
-        return self._through(0, (fix,))
+        return self._settled(self._through(0, (fix,)))
 
     def push(self, role: str, part: Part) -> Sequence[GnssSample]:
         """Return the fixes that this part completes."""
         stage = self._stages.index(role)
-        return self._through(stage + 1, self._pairings[stage].push(part))
-
-    @property
-    def waiting(self) -> bool:
-        """True while a fix or a part of one waits for its partner."""
-        return any(pairing.waiting for pairing in self._pairings)
+        return self._settled(self._through(stage + 1, self._pairings[stage].push(part)))
 
     def advance(self, now_us: int) -> Sequence[GnssSample]:
         """Return the fixes whose wait is over at inertial time `now_us`."""
@@ -68,13 +65,17 @@ class FixAssembly:
             waited = pairing.advance(now_us) if pairing.waiting else ()
             if waited:
                 fixes = [*fixes, *self._through(stage + 1, waited)]
-        return fixes
+        return self._settled(fixes)
 
     def flush(self) -> Sequence[GnssSample]:
         """Give up waiting."""
         fixes: list[GnssSample] = []
         for stage, pairing in enumerate(self._pairings):
             fixes += self._through(stage + 1, pairing.flush())
+        return self._settled(fixes)
+
+    def _settled(self, fixes: Sequence[GnssSample]) -> Sequence[GnssSample]:
+        self.waiting = any(pairing.waiting for pairing in self._pairings)
         return fixes
 
     def _through(self, stage: int, fixes: Sequence[GnssSample]) -> Sequence[GnssSample]:

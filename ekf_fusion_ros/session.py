@@ -245,14 +245,11 @@ class FusionSession:
             self._tell(time_us, f'no {role} message for {gap:.3f} s')
 
     def _accept(self, role: str, sample: Any) -> list[FusedOutput]:
+        if role == self._inertial_role:
+            return self._accept_inertial(role, sample)
         if role not in PARTS_OF_FIX:
             self._statistics[role].accepted += 1
         self._rates.note(role, sample.time_us)
-        if role == self._inertial_role:
-            if sample.time_us >= self._rates.due_us:
-                for slow in self._rates.step(sample.time_us):
-                    self._tell(sample.time_us, slow)
-            return self._run(role, sample)
         if role == LANDED:
             self._landed = sample
             self._navigation.note(sample)
@@ -267,6 +264,15 @@ class FusionSession:
         for due in self._holding.release(self._now_us):
             self._aid(*due)
         return []
+
+    def _accept_inertial(self, role: str, reading: Any) -> list[FusedOutput]:
+        time_us = reading.time_us
+        self._statistics[role].accepted += 1
+        self._rates.note(role, time_us)
+        if time_us >= self._rates.due_us:
+            for slow in self._rates.step(time_us):
+                self._tell(time_us, slow)
+        return self._run(role, reading)
 
     def _with_height(self, fix: GnssSample) -> GnssSample:
         if math.isfinite(fix.alt):
