@@ -55,6 +55,7 @@ setup(
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
         (f'share/{package_name}/config', sorted(glob('config/*.yaml'))),
+        (f'share/{package_name}/launch', sorted(glob('launch/*.launch.py'))),
     ],
     install_requires=['numpy>=1.26', 'PyYAML'],
     extras_require=extras,

@@ -63,7 +63,8 @@ def declared(*tags: str) -> set[str]:
 
 
 def test_package_xml_declares_every_import_of_the_package() -> None:
-    imported = third_party(ROOT / 'ekf_fusion_ros') - WITHOUT_KEY
+    imported = third_party(ROOT / 'ekf_fusion_ros') | third_party(ROOT / 'launch')
+    imported -= WITHOUT_KEY
     keys = {ROSDEP_KEYS.get(name, name) for name in imported}
     assert 'rclpy' in keys
     assert keys - declared('exec_depend', 'depend') == set()
@@ -75,7 +76,8 @@ def test_package_xml_declares_every_import_of_the_tests() -> None:
 
 
 def test_nothing_is_declared_that_nobody_imports() -> None:
-    imported = third_party(ROOT / 'ekf_fusion_ros') | third_party(ROOT / 'test')
+    imported = set[str]().union(
+        *(third_party(ROOT / folder) for folder in ('ekf_fusion_ros', 'launch', 'test')))
     keys = {ROSDEP_KEYS.get(name, name) for name in imported}
     assert declared('exec_depend', 'depend', 'test_depend') - keys == set()
 
