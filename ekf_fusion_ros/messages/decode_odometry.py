@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros import frames
+from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
 from ekf_fusion_ros.mathlib.rotation import quat_multiply
 from ekf_fusion_ros.messages import fields
 from ekf_fusion_ros.messages.flat import FlatMessage
@@ -40,12 +41,14 @@ MAX_VELOCITY = 1e3
 
 POSITION_PRIMARY = (True, True, False)
 VELOCITY_PRIMARY = (True, False, False)
+ALL_AXES = (True, True, True)
 ROTATION_PRIMARY = (False, False, True)
 
 
 def decode_odometry(message: Any, params: MessageParams) -> VisionSample:
     """Return an Odometry message as a sample in NED/FRD, velocity in the body frame (FRD).
 
+    The twist is in the child frame, or where `twist_frame` is parent in that of the header.
     Not measured are: the whole position when x or y is not, height (NaN z) alone; the
     orientation when yaw is not; the velocity when the sensor's x axis is not, and when the whole
     twist is zero with zero covariance, as many visual odometries leave it. An orientation
@@ -60,7 +63,10 @@ def decode_odometry(message: Any, params: MessageParams) -> VisionSample:
     fields.check_covariance(pose_cov, 'pose.covariance')
     position, position_var = _position(flat, pose_cov, kind, odometry)
     quaternion, angular_var = _orientation(flat, pose_cov, kind, odometry)
-    velocity, velocity_cov = _velocity(flat, odometry)
+    if odometry.twist_frame == 'child':
+        velocity, velocity_cov = _velocity(flat, odometry)
+    else:
+        velocity, velocity_cov = _velocity_of_parent(flat, kind, quaternion, odometry)
     if math.isnan(position[0]) and math.isnan(quaternion[0]) and math.isnan(velocity[0]):
         raise Refused(
             'not_measured', 'all variances say that nothing was measured: neither position nor '
@@ -148,8 +154,7 @@ def _velocity(flat: FlatMessage, params: OdometryMessageParams) -> tuple[Array, 
     covariance, measured = fields.measured_block(
         twist_cov, 0, VELOCITY_PRIMARY, params.velocity_noise ** 2, params.unmeasured_variance,
         'twist.covariance')
-    # A twist that was never filled in is all zero.
-    if not measured[0] or not (any(twist_cov) or any(flat.numbers[TWIST])):
+    if not measured[0] or _never_filled_in(flat):
         return NAN3, params.unmeasured_variance * np.eye(3)
     velocity = fields.measured_vector(
         flat.numbers[LINEAR], measured, 'twist.twist.linear', MAX_VELOCITY)
@@ -158,6 +163,33 @@ def _velocity(flat: FlatMessage, params: OdometryMessageParams) -> tuple[Array, 
             covariance[axis, axis] = params.lateral_velocity_noise ** 2
     rotation = sensor_to_body(params.mount_rpy, flat.child_frame_id)
     return rotation.dot(velocity), frames.rotate_covariance(covariance, rotation)
+
+
+def _velocity_of_parent(
+        flat: FlatMessage, kind: str, quaternion: Array,
+        params: OdometryMessageParams) -> tuple[Array, Array]:
+    """Turn a velocity along the axes of the parent frame into the body by quaternion (4,)."""
+    twist_cov = flat.numbers[TWIST_COVARIANCE]
+    fields.check_covariance(twist_cov, 'twist.covariance')
+    covariance, measured = fields.measured_block(
+        twist_cov, 0, ALL_AXES, params.velocity_noise ** 2, params.unmeasured_variance,
+        'twist.covariance')
+    level = measured[0] and measured[1]
+    if not level or math.isnan(quaternion[0]) or _never_filled_in(flat):
+        return NAN3, params.unmeasured_variance * np.eye(3)
+    velocity = fields.measured_vector(
+        flat.numbers[LINEAR], measured, 'twist.twist.linear', MAX_VELOCITY)
+    if not measured[2]:
+        covariance[2, 2] = params.unmeasured_variance
+    to_body = matrix_from_quat(quaternion).T
+    if kind == 'enu':
+        to_body = to_body @ frames.NED_ENU
+    return to_body.dot(velocity), frames.rotate_covariance(covariance, to_body)
+
+
+def _never_filled_in(flat: FlatMessage) -> bool:
+    """True where the whole twist is zero, with zero covariance."""
+    return not (any(flat.numbers[TWIST_COVARIANCE]) or any(flat.numbers[TWIST]))
 
 
 def _levelled(quaternion: Array) -> Array:

@@ -11,6 +11,7 @@ Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
 
 ODOMETRY_FRAMES = ('auto', 'enu', 'ned', 'frd')
+TWIST_FRAMES = ('child', 'parent')
 FLOW_AXES = ('auto', 'frd', 'flu')
 FLOW_CONVENTIONS = ('ecl', 'mavlink')
 AIRSPEED_KINDS = ('equivalent', 'true')
@@ -28,6 +29,11 @@ class OdometryMessageParams:
     true_heading: bool = param(
         False, 'The odometry frame is aligned with east and north, not only level; a frame '
         'declared ned is so anyway.')
+    twist_frame: str = param(
+        'child', 'Axes of the linear velocity: child as REP-105 has it, parent for a source that '
+        'gives it along the axes of header.frame_id (VINS-Fusion does); the orientation then '
+        'turns it into the body, and without one it counts as not measured.',
+        choices=TWIST_FRAMES)
     mount_xyz: Vector = param(
         ZERO, 'Position of the odometry sensor in the body frame (FLU, REP-103).', unit='m')
     mount_rpy: Vector = param(

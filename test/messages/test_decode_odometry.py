@@ -107,6 +107,35 @@ def test_mounting_turns_twist_and_attitude_like_scipy(build):
     assert sample.velocity_cov == pytest.approx(turn @ np.diag((1, 2, 3)) @ turn.T, abs=1e-14)
 
 
+@pytest.mark.parametrize(('parent', 'child'), [('world', 'body'), ('odom_ned', 'base_link_frd')])
+def test_twist_along_the_axes_of_the_parent_is_turned_into_the_body(build, parent, child):
+    rotation = pytest.importorskip('scipy.spatial.transform').Rotation
+    attitude = rotation.from_euler('xyz', (0.1, 0.4, -2.0))
+    x, y, z, w = attitude.as_quat()
+    message = build.odometry(parent, child, twist_var=(1.0, 2.0, 3.0, 0, 0, 0))
+    message.pose.pose.orientation = build.quaternion(w, x, y, z)
+    in_child = attitude.inv().as_matrix()
+    flip = np.diag((1.0, -1.0, -1.0)) if parent == 'world' else np.eye(3)
+    sample = decode_odometry(message, with_odometry(twist_frame='parent'))
+    assert sample.velocity == pytest.approx(flip @ in_child @ (0.5, -0.25, 0.125), abs=1e-15)
+    covariance = in_child @ np.diag((1.0, 2.0, 3.0)) @ in_child.T
+    assert sample.velocity_cov == pytest.approx(flip @ covariance @ flip, abs=1e-14)
+
+
+def test_twist_along_the_axes_of_the_parent_needs_the_orientation(build):
+    message = build.odometry(pose_var=(0.1, 0.1, 0.1, HUGE, HUGE, HUGE))
+    params = with_odometry(twist_frame='parent')
+    assert not decode_odometry(message, params).has_velocity
+    assert decode_odometry(message, params).has_position
+
+
+def test_unknown_climb_of_the_parent_is_no_known_climb_of_the_body(build):
+    message = build.odometry(twist_var=(0.1, 0.1, HUGE, 0, 0, 0))
+    sample = decode_odometry(message, with_odometry(twist_frame='parent'))
+    assert sample.velocity_cov[2, 2] > 1e4
+    assert np.diag(sample.velocity_cov)[0:2] == pytest.approx((0.1, 0.1))
+
+
 def test_zero_covariance_means_unknown(build):
     sample = decode_odometry(build.odometry(pose_var=(0,) * 6, twist_var=(0,) * 6), with_odometry(
         position_noise=0.5, velocity_noise=0.2, yaw_noise=0.3))
