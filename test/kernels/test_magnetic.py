@@ -63,6 +63,34 @@ def test_innovation_and_its_variance(seed, q, measured):
     np.testing.assert_array_equal(p, before)
 
 
+def test_an_axis_whose_variance_is_below_the_noise_spoils_all():
+    x = state(np.array((1.0, 0.0, 0.0, 0.0)), np.array((0.2, 0.05, 0.43)), np.zeros(3))
+    p = 0.01 * np.eye(24)
+    p[20, 20] = -1.0
+    measured, before, p_before = field_in_body(x), x.copy(), p.copy()
+    fit, _, variance, _, outcome = correct_by_field(
+        x, p, measured, 3, NOISE, 3.0, True, 0.24, 1e-3, ALL_FREE)
+    assert not fit and [bool(fault) for fault in outcome] == [False, True, False]
+    assert variance[1] < NOISE < variance[0]
+    np.testing.assert_array_equal(x, before)
+    np.testing.assert_array_equal(p, p_before)
+
+
+@pytest.mark.parametrize('axes', [2, 3])
+def test_one_bad_axis_that_counts_rejects_all(axes):
+    x = state(np.array((1.0, 0.0, 0.0, 0.0)), np.array((0.2, 0.05, 0.43)), np.zeros(3))
+    p = 1e-6 * np.eye(24)
+    measured, before = field_in_body(x) + np.array((0.01, 0.0, 5.0)), x.copy()
+    _, innovation, _, ratio, _ = correct_by_field(
+        x, p, measured, axes, NOISE, 3.0, True, 0.24, 1e-3, ALL_FREE)
+    if axes == 3:
+        assert ratio[2] > 1.0
+        np.testing.assert_array_equal(x, before)
+    else:
+        assert innovation[2] == ratio[2] == 0.0
+        assert x[16] > before[16]
+
+
 @pytest.mark.parametrize('axis', [0, 1, 2])
 def test_update_is_that_of_the_information_form(axis):
     x = state(np.array((0.5, 0.1, -0.3, 0.8)) / np.linalg.norm((0.5, 0.1, -0.3, 0.8)),
