@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections import deque
 from collections.abc import Callable
 from typing import Generic
@@ -12,12 +13,18 @@ T = TypeVar('T')
 MAX_AGE_US = 100_000
 """A sample older than this against the horizon is too late to be fused."""
 
+TOO_CLOSE = 'too_close'
+OVERTAKEN = 'overtaken'
+PUSHED_OUT = 'pushed_out'
+
 
 class SampleBuffer(Generic[T]):
     """FIFO of fixed capacity, ordered by time.
 
     `newest` stays readable after it has been taken out, but its time is then 0: whoever asks
-    "is the newest sample recent" hears "no" until the next one arrives.
+    "is the newest sample recent" hears "no" until the next one arrives. `passed_over` counts
+    the samples that were never handed out: arrived too close to the one before, overtaken by a
+    newer one at the horizon, or pushed out by one that arrived while the buffer was full.
     """
 
     def __init__(self, capacity: int) -> None:
@@ -25,16 +32,25 @@ class SampleBuffer(Generic[T]):
         self._waiting: deque[tuple[int, T]] = deque(maxlen=capacity)
         self.newest: T | None = None
         self.newest_time_us = 0
-        self.missed = 0
+        self.last_arrival_us = 0
+        self.passed_over: Counter[str] = Counter()
 
     def __len__(self) -> int:
         """Return the number of waiting samples."""
         return len(self._waiting)
 
+    def admits(self, arrival_us: int, min_interval_us: int) -> bool:
+        """True, and noted as the last arrival, where a sample is not too close to the last one."""
+        if arrival_us - self.last_arrival_us <= min_interval_us:
+            self.passed_over[TOO_CLOSE] += 1
+            return False
+        self.last_arrival_us = arrival_us
+        return True
+
     def push(self, time_us: int, sample: T) -> None:
         """Add the newest sample."""
         if len(self._waiting) == self._waiting.maxlen:
-            self.missed += 1
+            self.passed_over[PUSHED_OUT] += 1
         self._waiting.append((time_us, sample))
         self.newest = sample
         self.newest_time_us = time_us
@@ -54,7 +70,7 @@ class SampleBuffer(Generic[T]):
             if stamp <= time_us < stamp + MAX_AGE_US:
                 for _ in range(index):
                     waiting.popleft()
-                    self.missed += 1
+                    self.passed_over[OVERTAKEN] += 1
                 waiting.popleft()
                 if not waiting:
                     self.newest_time_us = 0

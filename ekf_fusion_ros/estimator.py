@@ -119,6 +119,9 @@ class Estimator(Protocol):
     def aid_statuses(self) -> Sequence[AidStatus]:
         """Return one record per kind of observation seen so far."""
 
+    def passed_over(self) -> Mapping[type, Mapping[str, int]]:
+        """Return by type and reason how many samples since the start had no effect."""
+
     def reset_counts(self) -> Mapping[str, int]:
         """Return how often each part of the state has jumped since the start."""
 

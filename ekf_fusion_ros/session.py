@@ -98,6 +98,7 @@ class FusionSession:
         self._last_altitude = 0.0
         self.restarts = 0
         self._resets_before: Counter[str] = Counter()
+        self._passed_over_before: dict[str, Counter[str]] = {}
         self._home: GeoPoint | None = None
         self._landed: LandedSample | None = None
         self.milestones: dict[str, int] = {}
@@ -386,6 +387,7 @@ class FusionSession:
         self.finish()
         self._collect()
         self._resets_before.update(self._estimator.reset_counts())
+        self._passed_over_before = self._passed_over()
         self._estimator.reset()
         self._navigation.restart()
         self._forget()
@@ -449,7 +451,18 @@ class FusionSession:
 
     def statistics(self) -> Mapping[str, RoleStatistics]:
         """Return the counts by role; exact at any time but for `pending` ones."""
+        for role, counts in self._passed_over().items():
+            self._statistics[role].passed_over = counts
         return self._statistics
+
+    def _passed_over(self) -> dict[str, Counter[str]]:
+        """Return what the estimator had no use for, by role, over all restarts."""
+        counts = {role: Counter(before) for role, before in self._passed_over_before.items()}
+        for kind, now in self._estimator.passed_over().items():
+            role = ROLE_OF_SAMPLE[kind]
+            if now and role in self._statistics:
+                counts[role] = counts.get(role, Counter()) + Counter(now)
+        return counts
 
     def resets(self) -> dict[str, int]:
         """Return how often each part of the state has jumped, and the session restarted."""

@@ -14,6 +14,7 @@ class RoleStatistics:
 
     `pending` messages wait for a partner and will be one or the other. `details` holds the
     first sentence said for each reason, `last` reason and sentence of the newest refusal.
+    `passed_over` counts, by reason, accepted ones that the filter had no use for.
     """
 
     received: int = 0
@@ -21,6 +22,7 @@ class RoleStatistics:
     refused: dict[str, int] = field(default_factory=dict)
     details: dict[str, str] = field(default_factory=dict)
     last: tuple[str, str] = ('', '')
+    passed_over: dict[str, int] = field(default_factory=dict)
 
     def refuse(self, reason: str, detail: str = '') -> bool:
         """Count a refusal; True when this reason is new."""
@@ -58,6 +60,7 @@ class RoleStatistics:
             'received': self.received,
             'accepted': self.accepted,
             'refused': dict(sorted(self.refused.items())),
+            'passed_over': dict(sorted(self.passed_over.items())),
         }
 
 

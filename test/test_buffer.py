@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from ekf_fusion_ros.buffer import OVERTAKEN
+from ekf_fusion_ros.buffer import PUSHED_OUT
+from ekf_fusion_ros.buffer import TOO_CLOSE
 from ekf_fusion_ros.buffer import SampleBuffer
 
 
@@ -28,7 +31,7 @@ def test_the_horizon_may_equal_the_stamp(three):
 
 def test_the_newest_sample_behind_the_horizon_is_taken_and_older_ones_are_missed(three):
     assert three.pop_first_older_than(250_000) == (200_000, 'b')
-    assert three.missed == 1
+    assert three.passed_over == {OVERTAKEN: 1}
     assert len(three) == 1
     assert three.pop_first_older_than(300_000) == (300_000, 'c')
 
@@ -48,7 +51,7 @@ def test_samples_that_are_too_late_do_not_block_newer_ones(three):
 def test_the_oldest_is_dropped_when_full(three):
     three.push(400_000, 'd')
     assert len(three) == 3
-    assert three.missed == 1
+    assert three.passed_over == {PUSHED_OUT: 1}
     assert three.pop_first_older_than(150_000) is None
     assert three.pop_first_older_than(200_000) == (200_000, 'b')
 
@@ -70,3 +73,10 @@ def test_nothing_in_nothing_out():
 def test_waiting_samples_can_be_changed(three):
     three.replace(str.upper)
     assert three.pop_first_older_than(200_000) == (200_000, 'B')
+
+
+def test_samples_too_close_to_the_one_before_are_counted():
+    buffer = SampleBuffer(3)
+    assert [buffer.admits(time_us, 20_000) for time_us in (100_000, 120_000, 120_001)] == [
+        True, False, True]
+    assert buffer.passed_over == {TOO_CLOSE: 1}

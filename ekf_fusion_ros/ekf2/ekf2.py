@@ -5,6 +5,7 @@ Reference behaviour: PX4-ECL of July 2021. What differs, and why: docs/px4_diffe
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from collections.abc import Sequence
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ekf_fusion_ros.buffer import SampleBuffer
 from ekf_fusion_ros.ekf2.accel_bias_check import AccelBiasCheck
 from ekf_fusion_ros.ekf2.alignment import Alignment
 from ekf_fusion_ros.ekf2.control import Control
@@ -72,6 +74,7 @@ class Ekf2:
         self._accel_bias_check = AccelBiasCheck(self.filter)
         self._ground_contact = GroundContact(self.filter)
         self._raw: ImuSample | None = None
+        self._too_early: Counter[type] = Counter()
         self.initialised = False
         self._queues = self._make_queues()
 
@@ -100,6 +103,8 @@ class Ekf2:
             self.inertial.started = True
         elif self.inertial.started:
             self._queues[type(sample)](sample, self.inertial.min_interval_us)
+        else:
+            self._too_early[type(sample)] += 1
 
     def update(self) -> bool:
         """Process the pushed ImuSample; True when the filter advanced by a period."""
@@ -187,6 +192,20 @@ class Ekf2:
     def aid_statuses(self) -> Sequence[AidStatus]:
         """Return one record per kind of observation that was ever tried."""
         return [o.status() for o in self.filter.observations.all() if o.judged or o.starts]
+
+    def passed_over(self) -> dict[type, dict[str, int]]:
+        """Return by type and reason how many samples never reached an aid source."""
+        control = self.control
+        buffers: dict[type, SampleBuffer[Any]] = {
+            MagSample: control.mag.buffer, BaroSample: control.baro.buffer,
+            VisionSample: control.vision.buffer, GnssSample: control.gnss.buffer,
+            RangeSample: control.range.buffer, FlowSample: control.flow.buffer,
+            AirspeedSample: control.airspeed.buffer,
+            AuxVelocitySample: control.aux_velocity.buffer}
+        counts = {kind: dict(buffer.passed_over) for kind, buffer in buffers.items()}
+        for kind, count in self._too_early.items():
+            counts.setdefault(kind, {})['before_inertial'] = count
+        return counts
 
     def reset_counts(self) -> dict[str, int]:
         """Return how often attitude, velocity and position have jumped."""

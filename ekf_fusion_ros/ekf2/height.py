@@ -312,7 +312,7 @@ class Height:
 
     def _prefer_vision(self) -> None:
         f = self._f
-        if not f.flags.ev_hgt and f.recent(self._vision.last_arrival_us, VISION_RECENT_US):
+        if not f.flags.ev_hgt and f.recent(self._vision.buffer.last_arrival_us, VISION_RECENT_US):
             self.start_vision()
             if not f.rng_hgt_before:
                 self.reset()

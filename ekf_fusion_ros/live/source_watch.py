@@ -114,6 +114,8 @@ class SourceWatch:
             'last_refusal': counts.last_refusal}
         values.update({f'refused.{reason}': str(count) for reason, count in reasons})
         values.update({f'detail.{reason}': counts.details[reason] for reason, _ in reasons})
+        passed_over = sorted(counts.passed_over.items())
+        values.update({f'passed_over.{reason}': str(count) for reason, count in passed_over})
         return values
 
     def _sentence(self, counts: RoleStatistics) -> str:

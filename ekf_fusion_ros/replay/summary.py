@@ -146,8 +146,10 @@ def _gist(summary: dict[str, Any]) -> list[str]:
                      f'{after:.1f} s after the start')
     for name, topic in summary['topics'].items():
         reasons = ', '.join(f'{n} {reason}' for reason, n in topic['refused'].items())
+        passed_over = ', '.join(f'{n} {reason}' for reason, n in topic['passed_over'].items())
         lines.append(f'{name}: {topic["received"]} received, {topic["accepted"]} accepted'
-                     + (f', refused: {reasons}' if reasons else ''))
+                     + (f', refused: {reasons}' if reasons else '')
+                     + (f', passed over: {passed_over}' if passed_over else ''))
     for name, aid in summary['aid_sources'].items():
         if aid['fused'] or aid['rejected']:
             lines.append(f'{name}: {aid["fused"]} fused, {aid["rejected"]} rejected')

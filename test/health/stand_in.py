@@ -98,6 +98,9 @@ class StandIn:
             dead_reckoning=self.dead_reckoning, local_position_valid=self.local_valid,
             global_position_valid=self.global_valid, in_air=self.in_air, yaw_jump=self.yaw_jump)
 
+    def passed_over(self):
+        return {}
+
     def aid_statuses(self):
         """Return position and velocity of fixes with the ratio and the innovation."""
         return [

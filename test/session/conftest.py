@@ -51,6 +51,9 @@ class RecordingEstimator:
     def aid_statuses(self):
         return []
 
+    def passed_over(self):
+        return {}
+
     def reset_counts(self):
         return {'attitude': 2}
 

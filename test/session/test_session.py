@@ -305,7 +305,7 @@ def test_withheld_messages_are_counted_and_kept_back(build, estimator):
     session.handle('fix', build.fix(START + 1))
     assert_exact(session)
     assert session.statistics()['fix'].as_dict() == {
-        'received': 2, 'accepted': 1, 'refused': {'withheld': 1}}
+        'received': 2, 'accepted': 1, 'refused': {'withheld': 1}, 'passed_over': {}}
 
 
 def test_samples_go_straight_in_without_roles(estimator):

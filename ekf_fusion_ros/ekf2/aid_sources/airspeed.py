@@ -28,14 +28,12 @@ class Airspeed:
         self._f = f
         self._wind = wind
         self.buffer: SampleBuffer[AirspeedSample] = SampleBuffer(capacity)
-        self._last_arrival_us = 0
         self._h, self._hp = np.zeros(24), np.zeros(24)
 
     def push(self, sample: AirspeedSample, min_interval_us: int) -> None:
         """Queue a sample unless it follows the last one too closely."""
-        if sample.time_us - self._last_arrival_us <= min_interval_us:
+        if not self.buffer.admits(sample.time_us, min_interval_us):
             return
-        self._last_arrival_us = sample.time_us
         delay_us = round(self._f.params.aiding.airspeed_delay_ms * 1000) + FILTER_PERIOD_US // 2
         self.buffer.push(sample.time_us - delay_us, sample)
 
@@ -43,7 +41,7 @@ class Airspeed:
         """Take the sample at the horizon."""
         f = self._f
         f.airspeed_popped = False
-        if not self._last_arrival_us:
+        if not self.buffer.last_arrival_us:
             return
         popped = self.buffer.pop_first_older_than(f.t_horizon)
         f.airspeed_popped = popped is not None

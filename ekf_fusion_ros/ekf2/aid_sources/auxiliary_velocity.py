@@ -20,20 +20,18 @@ class AuxiliaryVelocity:
         """Act on a filter."""
         self._f = f
         self.buffer: SampleBuffer[AuxVelocitySample] = SampleBuffer(capacity)
-        self._last_arrival_us = 0
 
     def push(self, sample: AuxVelocitySample, min_interval_us: int) -> None:
         """Queue a sample unless it follows the last one too closely."""
-        if sample.time_us - self._last_arrival_us <= min_interval_us:
+        if not self.buffer.admits(sample.time_us, min_interval_us):
             return
-        self._last_arrival_us = sample.time_us
         delay_us = round(self._f.params.aiding.auxvel_delay_ms * 1000) + FILTER_PERIOD_US // 2
         self.buffer.push(sample.time_us - delay_us, sample)
 
     def step(self) -> None:
         """Run once per filter period."""
         f = self._f
-        if not self._last_arrival_us:
+        if not self.buffer.last_arrival_us:
             return
         popped = self.buffer.pop_first_older_than(f.t_horizon)
         if popped is None or not f.flags.aided_horizontally():

@@ -64,7 +64,6 @@ class Gnss:
         self._yaw = GnssYaw(f, resets)
         self.buffer: SampleBuffer[GnssFix] = SampleBuffer(capacity)
         self.popped = False
-        self.last_arrival_us = 0
         self.height_intermittent = True
         self.vision_yaw_forbidden = False
         self._previous_fix_us = 0
@@ -80,10 +79,11 @@ class Gnss:
     def push(self, sample: GnssSample, min_interval_us: int, initialised: bool) -> bool:
         """Check a fix at arrival and queue it; True when it set the origin."""
         f = self._f
-        spaced = sample.time_us - self.last_arrival_us > min_interval_us
-        if not spaced or not self.wanted or sample.fix_type < 3:
+        if not self.wanted or sample.fix_type < 3:
+            self.buffer.passed_over['unwanted' if not self.wanted else 'no_3d_fix'] += 1
             return False
-        self.last_arrival_us = sample.time_us
+        if not self.buffer.admits(sample.time_us, min_interval_us):
+            return False
         self._checks.run(sample)
         places_origin = initialised and not f.earth.has_origin and self._checks.healthy
         origin_set = places_origin and math.isfinite(sample.alt)

@@ -60,7 +60,6 @@ class OpticalFlow:
         self._checks = checks
         self._motion = FlowMotion(f)
         self.buffer: SampleBuffer[FlowSample] = SampleBuffer(capacity)
-        self._last_arrival_us = 0
         self._popped: tuple[int, FlowSample] | None = None
         self._popped_us = 0
         self._sample: Compensated | None = None
@@ -70,15 +69,14 @@ class OpticalFlow:
 
     def push(self, sample: FlowSample, min_interval_us: int) -> None:
         """Queue a sample unless it follows the last one too closely."""
-        if sample.time_us - self._last_arrival_us <= min_interval_us:
+        if not self.buffer.admits(sample.time_us, min_interval_us):
             return
-        self._last_arrival_us = sample.time_us
         delay_us = round(self._f.params.flow.delay_ms * 1000) + FILTER_PERIOD_US // 2
         self.buffer.push(sample.time_us - delay_us, sample)
 
     def pop(self) -> None:
         """Take the sample at the horizon, and decide whether the terrain needs it."""
-        if not self._last_arrival_us:
+        if not self.buffer.last_arrival_us:
             return
         f = self._f
         self._popped = self.buffer.pop_first_older_than(f.t_horizon)
@@ -92,7 +90,7 @@ class OpticalFlow:
 
     def step(self) -> None:
         """Run once per filter period."""
-        if not self._last_arrival_us and not self._f.params.flow.enabled:
+        if not self.buffer.last_arrival_us and not self._f.params.flow.enabled:
             return
         self._motion.step()
         usable = self._popped is not None and self._compensate(self._popped[1])

@@ -37,7 +37,6 @@ class RangeFinder:
         self.fresh = False
         self.regular = False
         self.time_us = 0
-        self._last_arrival_us = 0
         self._cos_tilt = 1.0
         self._interval_us = 0.0
         self._bad_quality_us = 0
@@ -50,16 +49,15 @@ class RangeFinder:
 
     def push(self, sample: RangeSample, min_interval_us: int) -> None:
         """Queue a sample unless it follows the last one too closely."""
-        if sample.time_us - self._last_arrival_us <= min_interval_us:
+        if not self.buffer.admits(sample.time_us, min_interval_us):
             return
-        self._last_arrival_us = sample.time_us
         delay_us = round(self._f.params.range.delay_ms * 1000) + FILTER_PERIOD_US // 2
         self.buffer.push(sample.time_us - delay_us, sample)
 
     def pop(self) -> None:
         """Take the sample at the horizon and judge it; once per filter period."""
         now = self._f.t_horizon
-        if not self._last_arrival_us:
+        if not self.buffer.last_arrival_us:
             if self._interval_us < INTERVAL_LIMIT_US:
                 self._note_age(now)
             return
@@ -83,7 +81,7 @@ class RangeFinder:
     @property
     def cos_tilt(self) -> float:
         """Cosine of the angle between the sensor axis and down, at the start of the step."""
-        return self._cos_tilt if self._last_arrival_us else self._tilt()
+        return self._cos_tilt if self.buffer.last_arrival_us else self._tilt()
 
     @property
     def height(self) -> float:

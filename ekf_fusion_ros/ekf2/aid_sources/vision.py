@@ -36,7 +36,6 @@ class Vision:
         self._f = f
         self.buffer: SampleBuffer[VisionSample] = SampleBuffer(capacity)
         self.popped = False
-        self.last_arrival_us = 0
         self.delayed_us = 0
         self.position = VisionPosition(f, resets)
         self.velocity = VisionVelocity(f, resets)
@@ -45,9 +44,8 @@ class Vision:
 
     def push(self, sample: VisionSample, min_interval_us: int) -> None:
         """Queue a sample unless it follows the last one too closely."""
-        if sample.time_us - self.last_arrival_us <= min_interval_us:
+        if not self.buffer.admits(sample.time_us, min_interval_us):
             return
-        self.last_arrival_us = sample.time_us
         delay_us = round(self._f.params.vision.delay_ms * 1000) + FILTER_PERIOD_US // 2
         self.buffer.push(sample.time_us - delay_us, sample)
 
@@ -66,7 +64,7 @@ class Vision:
         f = self._f
         flags = f.flags
         active = flags.ev_pos or flags.ev_vel or flags.ev_yaw
-        if active and f.late(self.last_arrival_us, DATA_TIMEOUT_US):
+        if active and f.late(self.buffer.last_arrival_us, DATA_TIMEOUT_US):
             self.position.stop()
             self.velocity.stop()
             flags.ev_yaw = False
@@ -82,7 +80,7 @@ class Vision:
         if rotates and not flags.ev_yaw and sample.has_attitude:
             f.rot_ev = relative_rotation(f.x[0:4], sample.quaternion)
             self.heading.step(sample)
-        recent = f.recent(self.last_arrival_us, RECENT_US)
+        recent = f.recent(self.buffer.last_arrival_us, RECENT_US)
         if recent and flags.tilt_align and flags.yaw_align:
             if params.use_position and not flags.ev_pos and sample.has_position:
                 self.position.start()
