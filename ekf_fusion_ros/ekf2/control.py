@@ -48,9 +48,10 @@ class Control:
         self.terrain = Terrain(f)
         self.bank = YawEstimator()
         self.checks = GnssChecks(f)
-        self.mag = Magnetometer(f, self.resets, self.heading, self.terrain, observation_length)
-        self.baro = Barometer(f, observation_length)
         recovery = YawRecovery(f, self.resets, self.bank)
+        self.mag = Magnetometer(f, self.resets, self.heading, self.terrain, recovery,
+                                observation_length)
+        self.baro = Barometer(f, observation_length)
         self.gnss = Gnss(f, self.resets, self.checks, recovery, observation_length,
                          self.mag.align_to_course)
         self.vision = Vision(f, self.resets, self.heading, observation_length)

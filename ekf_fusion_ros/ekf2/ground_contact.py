@@ -49,6 +49,9 @@ class GroundContact:
         f = self._f
         if self._told or not f.flags.tilt_align:
             return
+        if not f.last_on_ground_us:
+            # what is known of a flight begins here, be it in the air
+            f.last_on_ground_us = f.t_now
         if self._is_rover:
             self._set(self._rolls() or (not quiet and (f.flags.in_air or self._travels())))
         elif not f.params.aiding.infer_in_air:
@@ -56,8 +59,8 @@ class GroundContact:
         elif quiet:
             self._rest_down = float(f.x[9])
             self._set(False)
-        elif f.flags.in_air or self._climbs() or self._travels():
-            self._set(True)
+        else:
+            self._set(f.flags.in_air or self._climbs() or self._travels())
 
     def _climbs(self) -> bool:
         return abs(float(self._f.x[9]) - self._rest_down) > FLIGHT_HEIGHT

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.events import EventKind
 from ekf_fusion_ros.ekf2.filter import Filter
+from ekf_fusion_ros.ekf2.state import GYRO_BIAS
 from ekf_fusion_ros.ekf2.state import PD
 from ekf_fusion_ros.ekf2.state import PN
 from ekf_fusion_ros.ekf2.state import VD
@@ -88,6 +89,21 @@ class Resets:
         self.counters.d_quat = delta
         self.counters.yaw_sum += 2.0 * math.atan2(float(delta[3]), float(delta[0]))
         self.counters.quat += 1
+
+    def false_yaw(self, yaw: float, variance: float) -> None:
+        """Turn to a yaw in rad, variance in rad^2, from one that has proved to be false.
+
+        A false yaw has taught a false gyro bias, which gets its switch-on variance, and a false
+        wind, which starts anew with the next air data.
+        """
+        f = self._f
+        if not f.params.gnss.thorough_yaw_recovery:
+            self.yaw(yaw, variance)
+            return
+        self.yaw(yaw, variance, variance_max=math.inf)
+        bias_variance = (f.params.imu.switch_on_gyro_bias * f.dt_avg) ** 2
+        f.cov.set_variances(GYRO_BIAS.start, np.full(3, bias_variance))
+        f.flags.wind = f.cov.wind_active = False
 
     def horizontal_velocity(self, velocity: Array, variance: Array) -> None:
         """Set NE velocity (2,) m/s and its variances (2,)."""

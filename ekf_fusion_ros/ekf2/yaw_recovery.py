@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import math
 
+from ekf_fusion_ros.ekf2.covariance import rotation_vector_variances
 from ekf_fusion_ros.ekf2.events import EventKind
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.resets import Resets
 from ekf_fusion_ros.ekf2.state import SECOND
 from ekf_fusion_ros.ekf2.yaw_estimator import YawEstimator
+from ekf_fusion_ros.mathlib.angles import wrap_pi
+from ekf_fusion_ros.mathlib.rotation import yaw_of
 
 YAW_SIGMA_MAX = 0.262
 RETRY_US = 5 * SECOND
@@ -16,7 +20,9 @@ TAKE_OFF_US = 30 * SECOND
 REJECTED_US = 1 * SECOND
 FIX_GAP_US = 1 * SECOND
 MAX_RESETS = 3
-COURSE_ERROR_COS2 = math.cos(math.radians(25.0)) ** 2
+YAW_ERROR = math.radians(25.0)
+COURSE_ERROR_COS2 = math.cos(YAW_ERROR) ** 2
+CONTRADICTION_SIGMA = 3.0
 MIN_SPEED_SQUARED = 0.16
 """Squared speed in (m/s)^2 below which a course says nothing about yaw."""
 
@@ -45,7 +51,7 @@ class YawRecovery:
             self._requested = False
         if not self._requested or not f.late(self._last_reset_us, RETRY_US):
             return
-        if self._turn_to_bank():
+        if self._turn_to_bank(self._resets.yaw):
             self._last_reset_us = f.t_now
             self._requested = False
 
@@ -57,7 +63,7 @@ class YawRecovery:
         may_retry = self._count < MAX_RESETS and f.late(self._last_reset_us, RETRY_US)
         if not may_retry or f.late(previous_fix_us, FIX_GAP_US):
             return False
-        if self._turn_to_bank():
+        if self._turn_to_bank(self._resets.false_yaw):
             self._resets.velocity_to_aiding(gnss_healthy)
             self._resets.position_to_aiding()
             self._last_reset_us = f.t_now
@@ -79,6 +85,16 @@ class YawRecovery:
             return False
         return self._courses_differ()
 
+    def contradicted(self) -> bool:
+        """True where the bank is certain of a yaw that is not that of the filter."""
+        f = self._f
+        if not (f.params.gnss.thorough_yaw_recovery and self._bank_is_certain()):
+            return False
+        difference = abs(wrap_pi(self._bank.yaw - yaw_of(f.rot)))
+        own_variance = rotation_vector_variances(f.x[0:4], f.cov.p)[2]
+        sigma = math.sqrt(self._bank.variance + float(own_variance))
+        return difference > max(YAW_ERROR, CONTRADICTION_SIGMA * sigma)
+
     def _courses_differ(self) -> bool:
         """Compare the course of the last velocity observation with that of the state."""
         f = self._f
@@ -93,12 +109,15 @@ class YawRecovery:
         dot = float(observed[0] * f.x[4] + observed[1] * f.x[5])
         return dot < 0.0 or dot * dot < COURSE_ERROR_COS2 * speed2 * own2
 
-    def _turn_to_bank(self) -> bool:
+    def _bank_is_certain(self) -> bool:
+        return self._bank.running and self._bank.variance < YAW_SIGMA_MAX ** 2
+
+    def _turn_to_bank(self, turn: Callable[[float, float], None]) -> bool:
         """Take over the yaw of the bank; False while it is not certain enough."""
         f = self._f
-        if not self._bank.running or not self._bank.variance < YAW_SIGMA_MAX ** 2:
+        if not self._bank_is_certain():
             return False
-        self._resets.yaw(self._bank.yaw, self._bank.variance)
+        turn(self._bank.yaw, self._bank.variance)
         f.flags.yaw_align = True
         if f.params.mag.type == 'none':
             f.events.add(f.t_now, EventKind.YAW_ALIGNED_IMU_GPS)

@@ -125,6 +125,10 @@ class GnssParams:
                             px4='EKF2_GPS_V_GATE', ecl='gps_vel_innov_gate')
     pos_gate: float = param(5.0, 'Innovation gate of position.', unit='sigma', min=1, max=100,
                             px4='EKF2_GPS_P_GATE', ecl='gps_pos_innov_gate')
+    thorough_yaw_recovery: bool = param(
+        True, 'Where velocities prove the yaw to be false, doubt also the gyro bias and the wind '
+        'that it has taught, and prefer the yaw of the EKF-GSF bank, once it is certain, to the '
+        'course of a fixed wing. Off, as in PX4, both stay.')
     place_early_fixes: bool = param(
         True, 'Give the fixes that wait when the origin is set their place; PX4 takes them to be '
         'at the origin.')

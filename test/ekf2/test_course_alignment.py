@@ -16,6 +16,7 @@ from ekf_fusion_ros.ekf2.filter import GnssFix
 from ekf_fusion_ros.ekf2.resets import Resets
 from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
+from ekf_fusion_ros.params.ekf2 import GnssParams
 from ekf_fusion_ros.samples import LandedSample
 
 
@@ -55,7 +56,7 @@ def in_flight(yaw, *, aligned=False, speed=15.0):
     f.flags.gps = f.flags.in_air = f.flags.fixed_wing = f.flags.yaw_align = True
     f.flags.mag_aligned_in_flight = aligned
     f.observations.gps_hor_vel.test_ratio = 1.5
-    return f, CourseAlignment(f, Resets(f))
+    return f, CourseAlignment(f, Resets(f), lambda: False)
 
 
 def yaw_of_state(f):
@@ -134,3 +135,22 @@ def test_on_the_ground_the_flight_is_forgotten():
     bench.ekf.push(LandedSample(bench.now_us, landed=True, fixed_wing=True))
     bench.run(0.1)
     assert 'mag_aligned_in_flight' not in bench.flags
+
+
+def test_a_bad_heading_is_left_to_a_bank_that_is_certain_of_another():
+    f, _ = in_flight(1.2)
+    course = CourseAlignment(f, Resets(f), lambda: True)
+    assert not course.align(course.usable_fix(), EARTH_FIELD)
+    assert yaw_of_state(f) == pytest.approx(1.2)
+    assert not f.flags.mag_aligned_in_flight
+
+
+@pytest.mark.parametrize(('thorough', 'sigma', 'wind'), [(True, 0.1, False), (False, 1e-3, True)])
+def test_what_a_false_yaw_has_taught_is_doubted(thorough, sigma, wind):
+    f = Filter(Ekf2Params(gnss=GnssParams(thorough_yaw_recovery=thorough)), 12)
+    f.flags.wind = True
+    f.cov.set_variances(10, np.full(3, (1e-3 * f.dt_avg) ** 2))
+    Resets(f).false_yaw(1.0, 0.005)
+    assert yaw_of_state(f) == pytest.approx(1.0)
+    np.testing.assert_allclose(np.sqrt(np.diag(f.cov.p)[10:13]) / f.dt_avg, sigma)
+    assert f.flags.wind is wind

@@ -159,3 +159,15 @@ def test_gnss_velocity_overrules_a_lying_accelerometer():
     adapted = velocity_error_after_a_lying_accelerometer(True)
     assert constant > 0.5
     assert adapted < 0.6 * constant
+
+
+def test_a_vehicle_that_is_never_quiet_starts_on_the_ground():
+    """A flight that begins before anything is known counts from there."""
+    bench = Bench()
+    bench.sending.add('fix')
+    bench.fix.velocity = np.array((0.0, 1.5, 0.0))
+    for _ in range(80):
+        shake(bench)
+        bench.run(0.1)
+    assert 'in_air' in bench.flags
+    assert 0 < bench.ekf.filter.last_on_ground_us < bench.now_us

@@ -17,6 +17,7 @@ from ekf_fusion_ros.simulation.scenario import default_sensors
 from ekf_fusion_ros.simulation.scenario import field_at
 from ekf_fusion_ros.simulation.trajectory import GRAVITY
 from ekf_fusion_ros.simulation.trajectory import FigureOfEight
+from ekf_fusion_ros.simulation.trajectory import Flight
 from ekf_fusion_ros.simulation.trajectory import Hover
 from ekf_fusion_ros.simulation.vision import Vision
 
@@ -139,6 +140,17 @@ def test_magnetometer_sees_the_earth_field_from_the_body():
     fields = np.array([s.field for s in samples]) - (0.01, 0.0, 0.0)
     np.testing.assert_allclose(truth.to_earth(fields), np.tile(field_at(ORIGIN), (len(fields), 1)),
                                atol=1e-12)
+
+
+def test_motors_disturb_the_magnetometer_in_the_air_only():
+    flight = Flight(duration=60.0)
+    quiet, disturbed = (
+        Magnetometer(earth_field=field_at(ORIGIN), field_noise=0.0, motor_field=motors)
+        .measure(flight, START, RNG(0)) for motors in ((0.0, 0.0, 0.0), (0.1, 0.0, 0.0)))
+    added = np.array([a.field - b.field for a, b in zip(disturbed, quiet, strict=True)])
+    assert not added[:50].any()
+    # a gentle flight: about one g
+    np.testing.assert_allclose(added[1500:1600], np.tile((0.1, 0.0, 0.0), (100, 1)), atol=0.02)
 
 
 def test_barometer_follows_height():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import math
 
 import numpy as np
@@ -31,10 +32,14 @@ BAD_YAW_MAX = 2
 class CourseAlignment:
     """Judges the heading by the course of the fixes."""
 
-    def __init__(self, f: Filter, resets: Resets) -> None:
-        """Act on a filter through its resets."""
+    def __init__(self, f: Filter, resets: Resets, contradicted: Callable[[], bool]) -> None:
+        """Act on a filter through its resets.
+
+        contradicted: whether the yaw is about to be replaced by one that is better known.
+        """
         self._f = f
         self._resets = resets
+        self._contradicted = contradicted
         self._bad_yaws = 0
         self.must_reset = False
 
@@ -51,17 +56,19 @@ class CourseAlignment:
         good = speed > SPEED_MIN and fix.sacc < ACCURACY_SHARE * speed
         return fix if good else None
 
-    def align(self, fix: GnssFix, field: Array) -> None:
+    def align(self, fix: GnssFix, field: Array) -> bool:
         """Turn to the course where the heading is bad, and start the earth field anew.
 
         field (3,): the delayed measurement in body axes. `must_reset` then tells whether velocity
-        and position have suffered.
+        and position have suffered. False where a bad heading is left to who knows better.
         """
         f = self._f
         error = wrap_pi(math.atan2(fix.velocity[1], fix.velocity[0])
                         - math.atan2(f.x[5], f.x[4]))
         velocity_refused = f.flags.gps and f.observations.gps_hor_vel.test_ratio > 1.0
         bad = abs(error) > COURSE_ERROR_MAX and velocity_refused
+        if bad and self._contradicted():
+            return False
         self._bad_yaws += bad
         if bad or not f.flags.yaw_align:
             self._turn(fix, error)
@@ -69,6 +76,7 @@ class CourseAlignment:
             f.x[BODY_FIELD] = 0.0
         start_field_from(f, field)
         f.cov.reset_field(f.params.mag.noise ** 2)
+        return True
 
     def _turn(self, fix: GnssFix, error: float) -> None:
         f = self._f
@@ -89,4 +97,4 @@ class CourseAlignment:
         else:
             yaw = math.atan2(east, north)
         spread = math.sqrt(fix.sacc ** 2 + f.cov.p[4, 4] + f.cov.p[5, 5])
-        self._resets.yaw(yaw, math.asin(min(spread / speed, 1.0)) ** 2)
+        self._resets.false_yaw(yaw, math.asin(min(spread / speed, 1.0)) ** 2)

@@ -24,6 +24,7 @@ from ekf_fusion_ros.ekf2.resets import Resets
 from ekf_fusion_ros.ekf2.state import FILTER_PERIOD
 from ekf_fusion_ros.ekf2.state import SECOND
 from ekf_fusion_ros.ekf2.terrain import Terrain
+from ekf_fusion_ros.ekf2.yaw_recovery import YawRecovery
 from ekf_fusion_ros.kernels.magnetic import low_pass
 from ekf_fusion_ros.samples import MagSample
 
@@ -50,13 +51,13 @@ class Magnetometer:
     """Observes, selects heading or 3-axis fusion, realigns yaw above the ground, fuses."""
 
     def __init__(self, f: Filter, resets: Resets, heading: HeadingFusion, terrain: Terrain,
-                 capacity: int) -> None:
+                 recovery: YawRecovery, capacity: int) -> None:
         """Act on a filter through its resets and heading fusion."""
         self._f = f
         self._resets = resets
         self._heading = heading
         self._terrain = terrain
-        self._course = CourseAlignment(f, resets)
+        self._course = CourseAlignment(f, resets, recovery.contradicted)
         self.average = SampleAverage(3)
         self.buffer: SampleBuffer[Array] = SampleBuffer(capacity)
         self.lpf = np.zeros(3)
@@ -241,7 +242,8 @@ class Magnetometer:
         fix = self._course.usable_fix()
         if fix is None:
             return self.reset_heading()
-        self._course.align(fix, self.field)
+        if not self._course.align(fix, self.field):
+            return False
         self._declination_done = False
         self.aligned_us = self._f.t_horizon
         return True
