@@ -122,8 +122,7 @@ class InertialInput:
     def push(self, reading: Any) -> list[ImuSample]:
         """Return the increments that end with this reading."""
         if self._imu is not None:
-            sample = reading if isinstance(reading, ImuSample) else self._imu.push(reading)
-            return [] if sample is None else [sample]
+            return [reading] if isinstance(reading, ImuSample) else self._imu.push(reading)
         assert self._odometry is not None
         samples: list[ImuSample] = self._odometry.push(reading)
         return samples

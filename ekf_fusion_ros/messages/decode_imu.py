@@ -121,13 +121,12 @@ class ImuIntegrator:
 
     That is exact for sensors that publish means over their interval, as autopilots do. An interval
     much longer than the usual one means that readings are missing (loggers and best-effort topics
-    lose some): only its last part belongs to the reading, the rest is interpolated. `gaps` counts
-    the intervals above `max_gap`; such a one is not filled at all but counts as one ordinary
-    interval.
+    lose some): they are interpolated between their neighbours. `gaps` counts the intervals above
+    `max_gap`; such a one is not filled at all but counts as one ordinary interval.
     """
 
     def __init__(self, params: MessageParams) -> None:
-        """Take `imu.max_gap`, the longest interval that one reading may fill."""
+        """Take `imu.max_gap`, the longest interval that is bridged."""
         self._max_gap_us = round(params.imu.max_gap * 1e6)
         self.gaps = 0
         self.reset()
@@ -138,57 +137,63 @@ class ImuIntegrator:
         self._interval_us = 0
         self._before: ImuReading | None = None
         self._steps_us: list[int] = []
+        self._usual_us = 0
         self._longest_us = 0
 
-    def push(self, reading: ImuReading) -> ImuSample | None:
-        """Return the increments up to this reading, None for the first.
+    def push(self, reading: ImuReading) -> list[ImuSample]:
+        """Return the increments up to this reading, none for the first.
 
         Raises Refused 'repeated_stamp' or 'backward_stamp' when time does not advance.
         """
-        last_us = self._last_us
-        if last_us is None:
+        last_us, before = self._last_us, self._before
+        if last_us is None or before is None:
             self._last_us, self._before = reading.time_us, reading
-            return None
+            return []
         step_us = reading.time_us - last_us
         if step_us <= 0:
             reason = 'backward_stamp' if step_us else 'repeated_stamp'
             raise Refused(reason, f'header.stamp is {-step_us} us before the last reading')
-        self._last_us = reading.time_us
+        self._last_us, self._before = reading.time_us, reading
         if step_us > self._max_gap_us:
             self.gaps += 1
-            step_us = self._interval_us or self._max_gap_us
-        else:
-            self._interval_us = step_us
-        if 0 < self._longest_us < step_us:
-            p, q, r, x, y, z = self._filled(reading, step_us)
-        else:
-            p, q, r = reading.rate
-            x, y, z = reading.specific_force
+            return [_increments(reading, self._interval_us or self._max_gap_us)]
+        self._interval_us = step_us
+        missing = 0 < self._longest_us < step_us
+        samples = self._bridge(before, reading) if missing else [_increments(reading, step_us)]
         self._note(step_us)
-        self._before = reading
-        dt = step_us * 1e-6
-        return ImuSample(
-            reading.time_us, np.array((p * dt, q * dt, r * dt)),
-            np.array((x * dt, y * dt, z * dt)), dt, dt)
+        return samples
 
-    def _filled(self, reading: ImuReading, step_us: int) -> list[float]:
-        """Return the means of rate and specific force over an interval that misses readings.
-
-        They lie on the line between their neighbours; their mean is half way.
-        """
-        assert self._before is not None
-        missing = 1.0 - self._longest_us / MISSING_FROM / step_us
-        return [value + 0.5 * missing * (before - value) for value, before in zip(
-            (*reading.rate, *reading.specific_force),
-            (*self._before.rate, *self._before.specific_force), strict=True)]
+    def _bridge(self, before: ImuReading, reading: ImuReading) -> list[ImuSample]:
+        """Return increments at the usual interval, along the line between two readings."""
+        step_us = reading.time_us - before.time_us
+        count = round(step_us / self._usual_us)
+        old = (*before.rate, *before.specific_force)
+        new = (*reading.rate, *reading.specific_force)
+        samples, last_us = [], before.time_us
+        for k in range(1, count + 1):
+            time_us = before.time_us + step_us * k // count
+            between = [a + (b - a) * k / count for a, b in zip(old, new, strict=True)]
+            samples.append(
+                _increments(ImuReading(time_us, between[0:3], between[3:6]), time_us - last_us))
+            last_us = time_us
+        return samples
 
     def _note(self, step_us: int) -> None:
         """Learn the usual interval: the median of some, then of the next ones."""
         self._steps_us.append(step_us)
         if len(self._steps_us) == USUAL_OF:
-            usual_us = sorted(self._steps_us)[USUAL_OF // 2]
-            self._longest_us = round(MISSING_FROM * usual_us)
+            self._usual_us = sorted(self._steps_us)[USUAL_OF // 2]
+            self._longest_us = round(MISSING_FROM * self._usual_us)
             self._steps_us.clear()
+
+
+def _increments(reading: ImuReading, step_us: int) -> ImuSample:
+    dt = step_us * 1e-6
+    p, q, r = reading.rate
+    x, y, z = reading.specific_force
+    return ImuSample(
+        reading.time_us, np.array((p * dt, q * dt, r * dt)), np.array((x * dt, y * dt, z * dt)),
+        dt, dt)
 
 
 def _check_present(numbers: Sequence[float], first: int, name: str) -> None:

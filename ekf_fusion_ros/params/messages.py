@@ -93,7 +93,7 @@ class ImuMessageParams:
         ZERO, 'Roll, pitch, yaw about fixed axes that turn sensor axes into body axes (FLU), as '
         'in a URDF.', unit='rad', min=-6.2832, max=6.2832)
     max_gap: float = param(
-        0.2, 'Gap between readings above which it is not filled with the newest reading.',
+        1.0, 'Longest gap between readings that is bridged by interpolation between them.',
         unit='s', min=0.01, max=5)
     max_rate: float = param(
         100.0, 'Largest believable angular rate.', unit='rad/s', min=1, max=1e4)

@@ -94,8 +94,8 @@ def reading_at(time_us):
 
 def test_increments_span_the_gap_between_stamps():
     integrator = ImuIntegrator(PARAMS)
-    assert integrator.push(reading_at(1_000_000)) is None
-    sample = integrator.push(reading_at(1_004_000))
+    assert integrator.push(reading_at(1_000_000)) == []
+    sample, = integrator.push(reading_at(1_004_000))
     assert sample.time_us == 1_004_000
     assert sample.delta_angle == pytest.approx((0.0004, 0.0008, 0.0012))
     assert sample.delta_velocity == pytest.approx((0.004, 0.0, -0.0392))
@@ -106,11 +106,12 @@ def test_a_long_gap_counts_and_is_no_giant_increment():
     integrator = ImuIntegrator(PARAMS)
     for time_us in (1_000_000, 1_010_000):
         integrator.push(reading_at(time_us))
-    sample = integrator.push(reading_at(6_000_000))
+    sample, = integrator.push(reading_at(6_000_000))
     assert sample.time_us == 6_000_000
     assert sample.delta_angle_dt == pytest.approx(0.01)
     assert integrator.gaps == 1
-    assert integrator.push(reading_at(6_020_000)).delta_angle_dt == pytest.approx(0.02)
+    sample, = integrator.push(reading_at(6_020_000))
+    assert sample.delta_angle_dt == pytest.approx(0.02)
     assert integrator.gaps == 1
 
 
@@ -125,10 +126,10 @@ def test_missing_readings_of_an_impact_are_interpolated():
     for k, value in zip(times, force, strict=True):
         if k % 4 == 2:
             continue
-        sample = integrator.push(ImuReading(int(k) * 4000, (0.0, 0.0, 0.0), (0.0, 0.0, value)))
-        if sample is not None:
-            assert sample.delta_velocity_dt == pytest.approx(0.004 * (k - last))
-            integrated += sample.delta_velocity[2]
+        samples = integrator.push(ImuReading(int(k) * 4000, (0.0, 0.0, 0.0), (0.0, 0.0, value)))
+        if samples:
+            assert sum(s.delta_velocity_dt for s in samples) == pytest.approx(0.004 * (k - last))
+            integrated += sum(s.delta_velocity[2] for s in samples)
             held += value * 0.004 * (k - last)
         last = k
     truth = 0.004 * force[1:].sum()
@@ -142,14 +143,15 @@ def test_time_must_advance(step, reason):
     with pytest.raises(Refused) as refused:
         integrator.push(reading_at(1_000_000 + step))
     assert refused.value.reason == reason
-    assert integrator.push(reading_at(1_010_000)).delta_angle_dt == pytest.approx(0.01)
+    sample, = integrator.push(reading_at(1_010_000))
+    assert sample.delta_angle_dt == pytest.approx(0.01)
 
 
 def test_reset_forgets_the_last_reading():
     integrator = ImuIntegrator(PARAMS)
     integrator.push(reading_at(1_000_000))
     integrator.reset()
-    assert integrator.push(reading_at(500_000)) is None
+    assert integrator.push(reading_at(500_000)) == []
 
 
 def test_husky_imu_reads_up_and_turns_with_the_wheels(recorded):
@@ -173,3 +175,16 @@ def test_rover_imu_has_no_orientation(recorded):
     reading = decode_imu(message, PARAMS)
     assert reading.orientation is None
     assert reading.specific_force[2] == pytest.approx(-9.81, abs=0.1)
+
+
+def test_a_gap_is_bridged_at_the_usual_interval():
+    """A turn that speeds up evenly is known to the last degree after half a second of silence."""
+    integrator = ImuIntegrator(PARAMS)
+    times_us = [*range(0, 1_000_000, 10_000), *range(1_500_000, 2_000_000, 10_000)]
+    samples = [
+        sample for time_us in times_us for sample in integrator.push(
+            # the mean rate over the 10 ms that end here
+            ImuReading(time_us, (0.0, 0.0, 1e-6 * (time_us - 5_000)), (0.0, 0.0, -9.8)))]
+    assert [s.time_us for s in samples] == list(range(10_000, 2_000_000, 10_000))
+    assert [s.delta_angle_dt for s in samples] == pytest.approx([0.01] * len(samples))
+    assert sum(s.delta_angle[2] for s in samples) == pytest.approx(0.5 * 1.99 ** 2)
