@@ -92,20 +92,36 @@ def euler(q):
     return np.degrees(np.stack([roll, pitch, yaw]))
 
 
+def at_times(time, table, names):
+    """Return (n, k) columns of a table with t_sec, interpolated to times in s."""
+    return np.stack([np.interp(time, table['t_sec'], table[name]) for name in names], axis=1)
+
+
+def angles_between(track, time, names, reference):
+    """Return the angle in deg between attitudes of a track and of a reference with t_sec."""
+    ours = quaternions(track, names)
+    recorded = quaternions(reference, ('qw', 'qx', 'qy', 'qz'))
+    theirs = np.stack(
+        [np.interp(track[time], reference['t_sec'], column) for column in recorded.T], axis=1)
+    theirs /= np.linalg.norm(theirs, axis=1, keepdims=True)
+    cosine = np.clip(np.abs(np.sum(ours * theirs, axis=1)), 0.0, 1.0)
+    return np.degrees(2.0 * np.arccos(cosine))
+
+
 def attitude_errors(replay, reference):
     """Return time, angle between the attitudes, and differences in roll, pitch, yaw, in deg."""
     track = np.genfromtxt(Path(replay) / 'trajectory.csv', delimiter=',', names=True)
-    truth = np.genfromtxt(reference, delimiter=',', names=True)
-    truth = truth[np.isfinite(truth['qw'])]
-    recorded = quaternions(truth, ('qw', 'qx', 'qy', 'qz'))
-    inside = (track['t'] >= truth['t_sec'][0]) & (track['t'] <= truth['t_sec'][-1])
+    recorded = np.genfromtxt(reference, delimiter=',', names=True)
+    recorded = recorded[np.isfinite(recorded['qw'])]
+    names = ('qw', 'qx', 'qy', 'qz')
+    inside = (track['t'] >= recorded['t_sec'][0]) & (track['t'] <= recorded['t_sec'][-1])
     track = track[inside]
-    ours = quaternions(track, ('qw', 'qx', 'qy', 'qz'))
-    theirs = np.stack([np.interp(track['t'], truth['t_sec'], column) for column in recorded.T], 1)
+    theirs = np.stack([np.interp(track['t'], recorded['t_sec'], column)
+                       for column in quaternions(recorded, names).T], axis=1)
     theirs /= np.linalg.norm(theirs, axis=1, keepdims=True)
-    cosine = np.clip(np.abs(np.sum(ours * theirs, axis=1)), 0.0, 1.0)
-    differences = (euler(ours) - euler(theirs) + 180.0) % 360.0 - 180.0
-    return track['t'], np.degrees(2.0 * np.arccos(cosine)), differences
+    differences = euler(quaternions(track, names)) - euler(theirs)
+    return (track['t'], angles_between(track, 't', names, recorded),
+            (differences + 180.0) % 360.0 - 180.0)
 
 
 def rms(values):

@@ -45,3 +45,19 @@ def test_the_attitude_is_that_of_the_autopilot(flight):
     assert rms(np.hypot(roll, pitch)) < 1.5
     if name == QUAD:
         assert rms(angle) < 3.0
+
+
+@pytest.mark.slow
+def test_flow_and_range_carry_the_quad_without_fixes(shared, tmp_path):
+    """Fixes end 30 s after the first output; 1.3 km later the position is 1 % of the way off."""
+    recording = shared / 'data' / QUAD / f'{QUAD}_mcap'
+    if not recording.exists():
+        pytest.skip(f'no {recording.name} in the shared folder')
+    assert main(['replay', str(recording), '--output', str(tmp_path), '--no-bag', '--topic',
+                 'flow=/flow', '--topic', 'range=/range', '--withhold', 'fix=40:900']) == 0
+    time, distance, _ = horizontal_errors(recording, tmp_path, 0.11, assumed_sigma=2.5)
+    flown = time < time[0] + 430.0
+    assert distance[flown].max() < 0.015 * 1300.0
+    reference = recording.parent / 'reference' / REFERENCE[QUAD]
+    _, angle, _ = attitude_errors(tmp_path, reference)
+    assert rms(angle) < 4.0
