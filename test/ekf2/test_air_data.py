@@ -102,6 +102,23 @@ def test_the_airflow_moves_the_barometer(name, velocity, coefficient):
     assert heights[1] - heights[0] == pytest.approx(0.5 * coefficient * 25.0 / GRAVITY, abs=0.02)
 
 
+def test_the_wind_is_taken_off_before_the_airflow_moves_the_barometer():
+    """5 m/s over the ground with 2 m/s of it as wind is 3 m/s of air."""
+    heights = []
+    for params in (BaroParams(), BaroParams(pressure_error_forward=0.3)):
+        bench = drifting((5.0, 0.0, 0.0), 3.0, baro=params)
+        bench.sending.add('airspeed')
+        bench.run(5.0)
+        assert 'wind' in bench.flags
+        bench.run(60.0)
+        heights.append(-bench.x[9])
+    air = bench.x[4:6] - bench.x[22:24]
+    assert np.hypot(*air) == pytest.approx(3.0, abs=0.05)
+    nose = matrix_from_quat(bench.x[0:4])[0:2, 0]
+    assert heights[1] - heights[0] == pytest.approx(
+        0.5 * 0.3 * float(nose @ air) ** 2 / GRAVITY, abs=1e-3)
+
+
 def test_the_correction_is_limited():
     heights = []
     for params in (BaroParams(), BaroParams(pressure_error_forward=0.3,

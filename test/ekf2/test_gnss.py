@@ -88,8 +88,8 @@ def test_after_an_outage_velocity_and_position_are_those_of_the_fix():
     while bench.resets.pos_ne == position:
         bench.run(0.01)
     assert bench.resets.vel_ne == velocity + 1
-    np.testing.assert_allclose(bench.x[4:7], bench.fix.velocity, atol=0.02)
-    np.testing.assert_allclose(bench.x[7:9], (0.0, 50.0), atol=0.15)
+    np.testing.assert_allclose(bench.x[4:7], bench.fix.velocity, atol=0.01)
+    np.testing.assert_allclose(bench.x[7:9], (0.0, 50.0), atol=0.01)
 
 
 def test_few_satellites_alone_do_not_stop_a_sole_source():

@@ -42,6 +42,12 @@ def test_flow_alone_tells_the_terrain():
     assert height == pytest.approx(8.0, abs=0.5)
 
 
+def test_flow_tells_the_terrain_by_default_where_range_sees_nothing():
+    height, valid = over_ground(seen_by_range=100.0, seen_by_flow=8.0)
+    assert valid
+    assert height == pytest.approx(8.0, abs=0.5)
+
+
 def test_range_is_preferred_to_flow():
     height, valid = over_ground(seen_by_range=2.4, seen_by_flow=8.0)
     assert valid

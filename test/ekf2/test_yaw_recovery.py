@@ -1,17 +1,25 @@
-"""When the EKF-GSF bank contradicts the yaw of the filter."""
+"""When the EKF-GSF bank contradicts the yaw of the filter, and when it replaces it."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 import math
 
+import numpy as np
 import pytest
 
+from ekf_fusion_ros.ekf2.ekf2 import Ekf2
+from ekf_fusion_ros.ekf2.events import EventKind
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.resets import Resets
 from ekf_fusion_ros.ekf2.yaw_estimator import YawEstimator
 from ekf_fusion_ros.ekf2.yaw_recovery import YawRecovery
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 from ekf_fusion_ros.params.ekf2 import GnssParams
+from ekf_fusion_ros.samples import ImuSample
+from ekf_fusion_ros.simulation.scenario import Scenario
+from ekf_fusion_ros.simulation.scenario import default_sensors
+from ekf_fusion_ros.simulation.trajectory import Flight
 
 
 class Bank(YawEstimator):
@@ -46,3 +54,43 @@ def test_an_uncertain_yaw_is_not_contradicted():
 def test_a_bank_that_rests_or_is_not_asked_contradicts_nothing(running, thorough):
     asked = recovery(Bank(90.0, 1.0, running), thorough=thorough)
     assert not asked.contradicted()
+
+
+def yaw_errors(motor_field, seed):
+    """Fly with motors that disturb the compass; return time s, yaw error deg, and the filter."""
+    flight = Flight(duration=90.0, size=40.0, period=20.0, height=15.0)
+    sensors = default_sensors(('imu', 'fix', 'magnetic_field', 'pressure', 'landed'))
+    sensors['magnetic_field'] = replace(sensors['magnetic_field'], motor_field=motor_field)
+    sensors['fix'] = replace(sensors['fix'], stamp_delay=0.11)
+    scenario = Scenario(trajectory=flight, sensors=sensors, seed=seed)
+    # the gates of the reference's own run
+    ekf = Ekf2(Ekf2Params(gnss=GnssParams(vel_gate=1.0, pos_gate=1.0)))
+    rows = []
+    for arrival in scenario.arrivals():
+        ekf.push(arrival.sample)
+        if isinstance(arrival.sample, ImuSample) and ekf.update():
+            w, x, y, z = ekf.filter.x[0:4]
+            rows.append(((ekf.filter.imu.time_us - scenario.start_us) * 1e-6,
+                         math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))))
+    time, yaw = np.array(rows).T
+    error = yaw - np.asarray(flight.motion(time).yaw)
+    return time, np.degrees((error + math.pi) % (2.0 * math.pi) - math.pi), ekf
+
+
+@pytest.mark.parametrize('seed', [1, 2, 3])
+def test_a_compass_that_motors_turn_at_take_off_is_found_out(seed):
+    time, error, ekf = yaw_errors((-0.35, 0.3, 0.0), seed)
+    seen = ekf.filter.events.seen
+    assert EventKind.EMERGENCY_YAW_RESET in seen
+    assert ekf.filter.flags.mag_fault
+    assert not {'mag_hdg', 'mag_3d'} & {
+        name for name in ekf.filter.flags.__slots__ if getattr(ekf.filter.flags, name)}
+    assert np.abs(error).max() > 60.0
+    assert np.abs(error[time > 60.0]).max() < 10.0
+
+
+def test_a_compass_that_motors_hardly_turn_is_kept():
+    _, error, ekf = yaw_errors((0.02, 0.0, 0.0), 1)
+    assert EventKind.EMERGENCY_YAW_RESET not in ekf.filter.events.seen
+    assert not ekf.filter.flags.mag_fault
+    assert np.abs(error[-1000:]).max() < 10.0

@@ -167,6 +167,17 @@ def test_low_pass_at_its_ends_holds_or_passes_through(share, expected):
     np.testing.assert_array_equal(value, expected)
 
 
+def test_low_pass_goes_to_one_and_from_there_to_minus_a_hundred():
+    value = np.zeros(3)
+    for goal, steps, within in ((1.0, 60, 0.01), (-100.0, 100, 0.01)):
+        before = value.copy()
+        for _ in range(steps):
+            low_pass(value, np.full(3, goal), 0.1)
+            assert (np.abs(goal - value) < np.abs(goal - before)).all()
+            before = value.copy()
+        np.testing.assert_allclose(value, goal, atol=within)
+
+
 def test_low_pass_of_zero_stays_zero():
     value = np.zeros(3)
     low_pass(value, np.zeros(3), 0.1)
