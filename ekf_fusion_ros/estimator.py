@@ -30,11 +30,14 @@ class NavState:
     """Navigation state of the body origin predicted to `time_us`, NED/FRD, SI.
 
     quaternion (4,) w, x, y, z body to earth; velocity (3,), position (3,) NED; angular_rate (3,)
-    body rad/s, bias removed; acceleration (3,) earth, gravity removed. pose_cov (6, 6): position
+    body rad/s, bias removed; acceleration (3,) NED m/s^2 at the inertial sensor, gravity and bias
+    removed. pose_cov (6, 6): position
     NED then small rotations about the earth axes; velocity_cov (3, 3) NED. Covariances are those
     of the fusion horizon. gnss_started: fixes have been fused at least once, so that position is
     one on the earth. in_air: the vehicle is taken to be off the ground, a rover to be moving.
-    yaw_jump: sum of the resets of yaw since the start, rad.
+    yaw_jump: sum of the resets of yaw since the start, rad. wind (2,) NE m/s with covariance
+    wind_cov (2, 2), ground_down: down position of the ground below in m with its variance in m^2;
+    None while they are not estimated.
     """
 
     time_us: int
@@ -54,6 +57,11 @@ class NavState:
     gnss_started: bool = True
     in_air: bool = False
     yaw_jump: float = 0.0
+    acceleration: Array | None = None
+    wind: Array | None = None
+    wind_cov: Array | None = None
+    ground_down: float | None = None
+    ground_variance: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,6 +38,7 @@ class OutputPredictor:
         self.now[0] = 1.0
         self.rot: Array = output['rot']
         self.rate: Array = output['rate']
+        self.acceleration: Array = output['acceleration']
         self.yaw: Array = output['yaw']
         self.tracking_error: Array = output['tracking_error']
         self._history = np.zeros((history, 10))

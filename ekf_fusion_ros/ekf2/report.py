@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.operator_view import operator_values
+from ekf_fusion_ros.ekf2.state import WIND
 from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import HealthLevel
 from ekf_fusion_ros.estimator import NavState
@@ -58,6 +59,8 @@ def nav_state(ekf: Ekf2) -> NavState:
     validity = ekf.control.validity
     biases = f.x[10:16] / f.dt_avg
     gyro_bias = biases[0:3]
+    terrain = ekf.control.terrain
+    wind = f.flags.wind
     return NavState(
         time_us=f.t_now,
         quaternion=now[0:4],
@@ -76,6 +79,11 @@ def nav_state(ekf: Ekf2) -> NavState:
         gnss_started=f.observations.gps_hor_pos.starts > 0,
         in_air=f.flags.in_air,
         yaw_jump=ekf.control.resets.counters.yaw_sum,
+        acceleration=out.acceleration.copy(),
+        wind=f.x[WIND].copy() if wind else None,
+        wind_cov=p[WIND, WIND].copy() if wind else None,
+        ground_down=terrain.ground_down() if terrain.valid else None,
+        ground_variance=terrain.variance,
     )
 
 

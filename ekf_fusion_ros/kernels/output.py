@@ -24,8 +24,9 @@ Array = NDArray[np.float64]
 
 OUTPUT = np.dtype([
     ('now', 'f8', (10,)), ('rot', 'f8', (3, 3)), ('correction', 'f8', (3,)), ('yaw', 'f8', (2,)),
-    ('rate', 'f8', (3,)), ('integral', 'f8', (6,)), ('tracking_error', 'f8', (3,)),
-    ('running', 'f8'), ('taus', 'f8', (2,)), ('periods', 'i8', (1,))])
+    ('rate', 'f8', (3,)), ('acceleration', 'f8', (3,)), ('integral', 'f8', (6,)),
+    ('tracking_error', 'f8', (3,)), ('running', 'f8'), ('taus', 'f8', (2,)),
+    ('periods', 'i8', (1,))])
 """What the output predictor keeps beside its history: its state and what corrects it, the time
 constants of velocity and position in s, the periods so far. It runs once it has been aligned."""
 
@@ -39,7 +40,7 @@ def propagate_predictor(
     s = state[0]
     if s['running'] != 0.0:
         propagate_output(s['now'], s['rot'], delta_angle, delta_velocity, angle_dt, velocity_dt, x,
-                         bias_scale, s['correction'], s['yaw'], s['rate'])
+                         bias_scale, s['correction'], s['yaw'], s['rate'], s['acceleration'])
 
 
 @kernel
@@ -68,12 +69,13 @@ def correct_predictor(
 def propagate_output(
     out: Array, rot: Array, delta_angle: Array, delta_velocity: Array, angle_dt: float,
     velocity_dt: float, x: Array, bias_scale: float, correction: Array, yaw: Array, rate: Array,
+    acceleration: Array,
 ) -> None:
     """Advance out (10,) and rot (3, 3) by one raw IMU sample, in place.
 
     bias_scale turns biases per filter period into biases per raw sample; correction (3,) rad;
     yaw (2,) accumulates the turn about the vertical and low-passes its rate; rate (3,) receives
-    the raw body rate.
+    the raw body rate, acceleration (3,) that against the earth, gravity and bias taken off.
     """
     d0, d1, d2 = three(delta_angle)
     b0, b1, b2 = three(x[10:13])
@@ -97,6 +99,7 @@ def propagate_output(
         increment = r0 * v0 + r1 * v1 + r2 * v2
         if i == 2:
             increment += GRAVITY * velocity_dt
+        acceleration[i] = increment / velocity_dt
         before = out[4 + i]
         out[4 + i] = before + increment
         out[7 + i] += 0.5 * (before + out[4 + i]) * velocity_dt

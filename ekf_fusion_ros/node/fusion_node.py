@@ -19,6 +19,8 @@ from rclpy.utilities import remove_ros_args
 
 from ekf_fusion_ros.live.switches import Switches
 from ekf_fusion_ros.live.work_watch import WorkWatch
+from ekf_fusion_ros.node.estimator_numbers import EstimatorNumbers
+from ekf_fusion_ros.node.events import EventsPublisher
 from ekf_fusion_ros.node.guard import Guard
 from ekf_fusion_ros.node.inputs import Inputs
 from ekf_fusion_ros.node.intake import Intake
@@ -53,6 +55,7 @@ class FusionNode(Node):  # type: ignore[misc]
         self._switches = Switches(node.roles, self._session.inertial_role, enabled=True)
         self._outputs = Publishers(self, self._params)
         self._navigation = NavigationPublisher(self, self._params)
+        self._events = EventsPublisher(self)
         self._inputs = Inputs(self, node, self._queue)
         self._reporting = Reporting(
             self, self._session, self._inputs, self._switches, self._work, self._navigation,
@@ -87,6 +90,9 @@ class FusionNode(Node):  # type: ignore[misc]
         """Subscribe and run the filter."""
         self._inputs.subscribe()
         self._every(1.0 / self._params.node.core_rate, self._run_core)
+        if self._params.node.estimator_rate > 0.0:
+            numbers = EstimatorNumbers(self, self._session)
+            self._every(1.0 / self._params.node.estimator_rate, numbers.publish)
 
     def end(self) -> None:
         """Leave the network."""
@@ -115,8 +121,7 @@ class FusionNode(Node):  # type: ignore[misc]
         while self._intake and time.monotonic() < deadline:
             self._handle(*self._intake.take())
         self._navigation.publish(self._session.navigation)
-        for event in self._session.drain_events():
-            self.get_logger().info(f'{event.time_us / 1e6:.3f} s: {event.text}')
+        self._events.publish(self._session.drain_events())
         self._work.end(time.monotonic())
 
     def _handle(self, role: str, message: Any) -> None:

@@ -18,8 +18,8 @@ from ekf_fusion_ros.health.status import NavigationStatus
 from ekf_fusion_ros.live.report import Report
 from ekf_fusion_ros.messages.encode_home import HomeFields
 from ekf_fusion_ros.messages.encode_home import encode_home
-from ekf_fusion_ros.node.publishers import stamp_message
 from ekf_fusion_ros.node.qos import latched_qos
+from ekf_fusion_ros.node.stamps import stamp_message
 from ekf_fusion_ros.params.tree import Params
 from ekf_fusion_ros.session import FusionSession
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from builtin_interfaces.msg import Time
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -17,14 +16,15 @@ from ekf_fusion_ros.messages.encode import OdometryFields
 from ekf_fusion_ros.messages.encode import encode_fix
 from ekf_fusion_ros.messages.encode import encode_gnss_odometry
 from ekf_fusion_ros.messages.encode import encode_odometry
-from ekf_fusion_ros.messages.stamps import seconds_nanoseconds
 from ekf_fusion_ros.node.qos import output_qos
 from ekf_fusion_ros.node.qos import publisher_events
+from ekf_fusion_ros.node.stamps import stamp_message
+from ekf_fusion_ros.node.surroundings import SurroundingsPublisher
 from ekf_fusion_ros.params.tree import Params
 
 
 class Publishers:
-    """`odometry/filtered`, `odometry/gps` and `gps/filtered` from fused outputs."""
+    """`odometry/filtered`, `odometry/gps`, `gps/filtered` and company from fused outputs."""
 
     def __init__(self, node: Node, params: Params) -> None:
         def publisher(kind: type, name: str) -> Any:
@@ -37,6 +37,7 @@ class Publishers:
         self._odometry = publisher(Odometry, 'odometry/filtered')
         self._gps = publisher(Odometry, 'odometry/gps')
         self._fix = publisher(NavSatFix, 'gps/filtered')
+        self._surroundings = SurroundingsPublisher(node, params)
 
     def publish(self, output: FusedOutput) -> None:
         """Publish one output and the fixes that came with it.
@@ -47,6 +48,7 @@ class Publishers:
         world, body = names.output_frame, names.base_link_frame
         self._odometry.publish(
             odometry_message(encode_odometry(output.nav, world, body)))
+        self._surroundings.publish(output.nav)
         origin = output.nav.origin
         if output.local or origin is None:
             return
@@ -88,9 +90,3 @@ def fix_message(fields: NavSatFixFields) -> NavSatFix:
     message.position_covariance = fields.position_covariance
     message.position_covariance_type = fields.position_covariance_type
     return message
-
-
-def stamp_message(time_us: int) -> Time:
-    """Return a stamp of integer microseconds as a ROS message."""
-    sec, nanosec = seconds_nanoseconds(time_us)
-    return Time(sec=sec, nanosec=nanosec)

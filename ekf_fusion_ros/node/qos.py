@@ -22,6 +22,7 @@ SENSOR_DEPTH = 200
 IMU_DEPTH = 1000
 """Deep enough for seconds of a busy machine: a message that DDS overwrites is lost unnoticed."""
 
+EVENTS_DEPTH = 100
 OUTPUT_DEPTH = 100
 """One odometry message can make ten rows at once."""
 
@@ -38,6 +39,13 @@ def output_qos() -> QoSProfile:
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST, depth=OUTPUT_DEPTH,
         reliability=ReliabilityPolicy.RELIABLE)
+
+
+def events_qos() -> QoSProfile:
+    """Return the profile of events: a late subscriber gets the last ones."""
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST, depth=EVENTS_DEPTH,
+        reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def subscription_events(node: Node, topic: str) -> SubscriptionEventCallbacks:

@@ -54,6 +54,11 @@ class NodeParams:
         max=1000000)
     publish_every_update: bool = param(
         False, 'Publish one row a filter update instead of `session.output_rate`.')
+    publish_acceleration: bool = param(
+        False, 'Publish `accel/filtered`: acceleration in the body, gravity removed.')
+    estimator_rate: float = param(
+        0.0, 'Rate of `~/estimator`: states, variances, innovations, test ratios and resets as '
+        'numbers by name; 0 = not published.', unit='Hz', min=0, max=100)
     diagnostics_rate: float = param(
         1.0, 'Rate of /diagnostics.', unit='Hz', min=0.1, max=10)
     world_frame: str = param(

@@ -144,6 +144,21 @@ def test_without_noise_the_error_vanishes():
     assert np.degrees(np.abs(flown.yaw)).max() < 0.2
 
 
+def test_the_acceleration_told_is_that_of_the_vehicle():
+    scenario = Scenario(trajectory=FLIGHT, sensors=perfect_sensors(), seed=0)
+    ekf, errors = Ekf2(Ekf2Params()), []
+    for arrival in scenario.arrivals():
+        ekf.push(arrival.sample)
+        if isinstance(arrival.sample, ImuSample) and ekf.update():
+            nav, time = ekf.nav_state(), 1e-6 * (arrival.time_us - scenario.start_us)
+            if nav is not None and time > 70.0:
+                # the sample holds the mean over the interval that it ends
+                middle = time - 0.5 * arrival.sample.delta_velocity_dt
+                truth = scenario.trajectory.motion(np.array([middle])).acceleration[0]
+                errors.append(nav.acceleration - truth)
+    assert np.abs(errors).max() < 0.1
+
+
 @pytest.mark.slow
 def test_antenna_place_matters_and_is_taken_off():
     arm = (0.8, -0.5, 0.0)

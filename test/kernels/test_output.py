@@ -31,7 +31,8 @@ def test_attitude_turns_by_increment_less_bias_plus_correction(q, angle, bias, c
     out, rot, x = np.zeros(10), before.as_matrix(), np.zeros(24)
     yaw, rate = np.zeros(2), np.zeros(3)
     out[0:4], x[10:13] = q, bias
-    propagate_output(out, rot, angle, np.zeros(3), DT, DT, x, 0.5, correction, yaw, rate)
+    propagate_output(out, rot, angle, np.zeros(3), DT, DT, x, 0.5, correction, yaw, rate,
+                     np.zeros(3))
     step = angle - 0.5 * bias + correction
     expected = before * rotation.from_rotvec(step)
     np.testing.assert_allclose(rot, expected.as_matrix(), atol=1e-9)
@@ -40,11 +41,12 @@ def test_attitude_turns_by_increment_less_bias_plus_correction(q, angle, bias, c
 
 
 def test_free_fall():
-    out, rot = np.zeros(10), np.eye(3)
+    out, rot, acceleration = np.zeros(10), np.eye(3), np.zeros(3)
     out[0], out[4] = 1.0, 3.0
     for _ in range(400):
         propagate_output(out, rot, np.zeros(3), np.zeros(3), DT, DT, np.zeros(24), 0.5,
-                         np.zeros(3), np.zeros(2), np.zeros(3))
+                         np.zeros(3), np.zeros(2), np.zeros(3), acceleration)
+    np.testing.assert_allclose(acceleration, (0.0, 0.0, 9.80665))
     np.testing.assert_allclose(out[4:10], (3.0, 0.0, 2.0 * 9.80665, 6.0, 0.0, 2.0 * 9.80665))
 
 
