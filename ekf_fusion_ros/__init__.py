@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ekf_fusion_ros.estimator import Estimator
     from ekf_fusion_ros.estimator import Event
     from ekf_fusion_ros.estimator import GeoPoint
+    from ekf_fusion_ros.estimator import GivenPose
     from ekf_fusion_ros.estimator import Health
     from ekf_fusion_ros.estimator import NavState
     from ekf_fusion_ros.params.ekf2 import Ekf2Params
@@ -39,7 +40,8 @@ __version__ = '0.1.0'
 
 _HOMES = {
     'ekf2.ekf2': ('Ekf2',),
-    'estimator': ('AidStatus', 'Estimator', 'Event', 'GeoPoint', 'Health', 'NavState'),
+    'estimator': (
+        'AidStatus', 'Estimator', 'Event', 'GeoPoint', 'GivenPose', 'Health', 'NavState'),
     'params.ekf2': ('Ekf2Params',),
     'params.files': ('load_file',),
     'params.tree': ('Params', 'with_overrides'),
@@ -73,6 +75,7 @@ __all__ = [
     'FlowSample',
     'FusionSession',
     'GeoPoint',
+    'GivenPose',
     'GnssSample',
     'HeadingSample',
     'Health',

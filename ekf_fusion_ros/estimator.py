@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+import math
 from typing import Protocol
 
 import numpy as np
@@ -23,6 +24,26 @@ class GeoPoint:
     lat: float
     lon: float
     alt: float
+
+    @property
+    def on_earth(self) -> bool:
+        """True for a latitude, longitude and altitude that exist."""
+        return abs(self.lat) <= 90.0 and abs(self.lon) <= 180.0 and math.isfinite(self.alt)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GivenPose:
+    """Where an operator says that the body origin is now, in the local frame.
+
+    position (3,) NED m, yaw rad from north, clockwise; variances position_var (3,) m^2, yaw_var
+    rad^2. A component without variance (0) is not given: the estimate of it stays. Roll and pitch
+    are never given: gravity tells them.
+    """
+
+    position: Array
+    position_var: Array
+    yaw: float
+    yaw_var: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,6 +162,9 @@ class Estimator(Protocol):
 
     def set_origin(self, origin: GeoPoint) -> bool:
         """Move the origin of the local frame; False where the point is unusable."""
+
+    def set_pose(self, pose: GivenPose) -> bool:
+        """Jump to a pose; False before there is a state that could jump."""
 
     def reset(self) -> None:
         """Forget everything but the parameters."""

@@ -17,6 +17,7 @@ from ekf_fusion_ros.completion import Completion
 from ekf_fusion_ros.estimator import Estimator
 from ekf_fusion_ros.estimator import Event
 from ekf_fusion_ros.estimator import GeoPoint
+from ekf_fusion_ros.estimator import GivenPose
 from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import HealthLevel
 from ekf_fusion_ros.estimator import NavState
@@ -30,6 +31,7 @@ from ekf_fusion_ros.inputs import decoder_of
 from ekf_fusion_ros.inputs import make_estimator
 from ekf_fusion_ros.inputs import make_motion_heading
 from ekf_fusion_ros.inputs import rows_decoder_of
+from ekf_fusion_ros.map_origin import fixed_origin
 from ekf_fusion_ros.messages.flat import FlatRows
 from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.navigation_watch import NavigationWatch
@@ -99,7 +101,7 @@ class FusionSession:
         self.restarts = 0
         self._resets_before: Counter[str] = Counter()
         self._passed_over_before: dict[str, Counter[str]] = {}
-        self._home: GeoPoint | None = None
+        self._home = fixed_origin(self.params.session)
         self._landed: LandedSample | None = None
         self.milestones: dict[str, int] = {}
         self._navigation = NavigationWatch(self.params, self.roles, local=self._local)
@@ -409,11 +411,25 @@ class FusionSession:
         return None if nav is None else nav.origin
 
     def set_origin(self, origin: GeoPoint) -> bool:
-        """Move the origin of the map frame; False where the point is unusable."""
-        moved = self._estimator.set_origin(origin)
+        """Move the origin of the map frame; False where the point is unusable.
+
+        The place of the vehicle on the earth stays. Before a fix has placed the vehicle on the
+        earth the origin waits for it.
+        """
+        if not origin.on_earth:
+            return False
+        waits = not self._local and self.origin is None
+        moved = waits or self._estimator.set_origin(origin)
         if moved:
             self._home = origin
         return moved
+
+    def set_pose(self, pose: GivenPose) -> bool:
+        """Jump to a pose of the map frame; False before there is a state and a map."""
+        nav = self._estimator.nav_state()
+        if nav is None or not (self._local or self._at_home(nav)):
+            return False
+        return self._estimator.set_pose(pose)
 
     @property
     def navigation(self) -> NavigationStatus:
@@ -433,9 +449,21 @@ class FusionSession:
         self._note(events)
         return done
 
-    def reset(self) -> None:
-        """Start again with the same parameters; counts and events go on."""
+    def reset(self, *, keep_origin: bool = True) -> None:
+        """Start again with the same parameters; counts and events go on.
+
+        Without keep_origin the map gets a new origin: the fixed one where there is one, else that
+        of the next good fix.
+        """
+        if not keep_origin:
+            self._home = fixed_origin(self.params.session)
+        self.announce('the estimator starts again on request, the origin of the map '
+                      + ('stays' if keep_origin else 'is set anew'))
         self._restart()
+
+    def announce(self, text: str) -> None:
+        """Tell of something that was done to the session, as an event of now."""
+        self._tell(self._now_us or 0, text)
 
     def alignment(self) -> tuple[float, float] | None:
         """Return heading of the odometry frame against ENU and its sigma in rad.

@@ -23,8 +23,8 @@ LAYERS = (
     ('messages',),
     (
         'session', 'airspeed_conditions', 'completion', 'fix_assembly', 'fused_output',
-        'holding', 'inputs', 'navigation_watch', 'odometry_heading', 'pairing', 'roles',
-        'sample_check', 'sensor_rates', 'stamp_order', 'statistics', 'warm_up',
+        'holding', 'inputs', 'map_origin', 'navigation_watch', 'odometry_heading', 'pairing',
+        'roles', 'sample_check', 'sensor_rates', 'stamp_order', 'statistics', 'warm_up',
     ),
     ('live',),
     ('analysis',),

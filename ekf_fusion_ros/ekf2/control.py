@@ -19,6 +19,7 @@ from ekf_fusion_ros.ekf2.alignment import initialise_covariance
 from ekf_fusion_ros.ekf2.covariance import rotation_vector_variances
 from ekf_fusion_ros.ekf2.events import EventKind
 from ekf_fusion_ros.ekf2.filter import Filter
+from ekf_fusion_ros.ekf2.given_pose import take_pose
 from ekf_fusion_ros.ekf2.gnss_checks import GnssChecks
 from ekf_fusion_ros.ekf2.heading import HeadingFusion
 from ekf_fusion_ros.ekf2.height import Height
@@ -32,6 +33,7 @@ from ekf_fusion_ros.ekf2.wind import Wind
 from ekf_fusion_ros.ekf2.yaw_estimator import YawEstimator
 from ekf_fusion_ros.ekf2.yaw_recovery import YawRecovery
 from ekf_fusion_ros.estimator import GeoPoint
+from ekf_fusion_ros.estimator import GivenPose
 
 TILT_ALIGNED_VARIANCE = math.radians(3.0) ** 2
 AIRSPEED_RECENT_US = SECOND
@@ -127,11 +129,20 @@ class Control:
             return False
         if not had_origin:
             self.height.refer_to(earth.alt_ref - altitude_before)
-        shift = float(self._f.x[PD]) - before
+        self._shift_heights(float(self._f.x[PD]) - before)
+        return True
+
+    def set_pose(self, pose: GivenPose) -> None:
+        """Jump to a pose; relative heights follow, an absolute one may contradict it."""
+        before = float(self._f.x[PD])
+        take_pose(self._f, self.resets, pose)
+        self._shift_heights(float(self._f.x[PD]) - before)
+
+    def _shift_heights(self, shift: float) -> None:
+        """Let what refers to the vehicle's height follow a shift in m, positive down."""
         self.baro.offset += shift
         self.height.move(shift)
         self.terrain.move(shift)
-        return True
 
     def _check_tilt(self) -> None:
         f = self._f

@@ -27,6 +27,7 @@ from ekf_fusion_ros.ekf2.report import nav_state
 from ekf_fusion_ros.estimator import AidStatus
 from ekf_fusion_ros.estimator import Event
 from ekf_fusion_ros.estimator import GeoPoint
+from ekf_fusion_ros.estimator import GivenPose
 from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import NavState
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
@@ -225,6 +226,16 @@ class Ekf2:
     def set_origin(self, origin: GeoPoint) -> bool:
         """Move the origin of the local frame, keeping the place of the vehicle on the earth."""
         return self.control.move_origin(origin)
+
+    def set_pose(self, pose: GivenPose) -> bool:
+        """Jump to a pose of the body origin (NED, m, rad) at the newest IMU sample.
+
+        What the pose does not give stays; the velocity turns with the yaw. Sensors that measure
+        the same go on and may contradict it. False before initialisation.
+        """
+        if self.initialised:
+            self.control.set_pose(pose)
+        return self.initialised
 
 
 def max_delay_ms(params: Ekf2Params) -> float:

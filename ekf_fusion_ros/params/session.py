@@ -27,6 +27,12 @@ class SessionParams:
         0.0, 'Delay of odometry stamps against the inertial input; a stamp by REP-103 habit is '
         'the time of measurement. Replaces the default of ekf2.vision.delay_ms.', unit='ms',
         min=0, max=1000)
+    origin_from: str = param(
+        'first_fix', 'What sets the origin of the map: the first good fix, or `session.origin`.',
+        choices=('first_fix', 'parameter'))
+    origin: tuple[float, float, float] = param(
+        (0.0, 0.0, 0.0), 'Fixed origin of the map: latitude and longitude in deg, altitude in m '
+        'in the datum of the fixes. Used with `session.origin_from: parameter`.')
     stamp_gap_max: float = param(
         5.0, 'Step of the inertial stamps above which the estimator starts again, once a second '
         'message confirms it.', unit='s', min=0.5, max=60)

@@ -23,6 +23,7 @@ class RecordingEstimator:
     def __init__(self):
         self.resets = 0
         self.samples = []
+        self.poses = []
         self.forget()
 
     def forget(self):
@@ -65,6 +66,10 @@ class RecordingEstimator:
 
     def set_origin(self, origin):
         self.origin = origin
+        return True
+
+    def set_pose(self, pose):
+        self.poses.append(pose)
         return True
 
     def reset(self):

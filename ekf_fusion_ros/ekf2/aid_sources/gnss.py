@@ -129,8 +129,7 @@ class Gnss:
     def move_origin(self, origin: GeoPoint) -> bool:
         """Move the origin; position and waiting fixes keep their place on the earth."""
         f = self._f
-        on_earth = abs(origin.lat) <= 90.0 and abs(origin.lon) <= 180.0
-        if not on_earth or not math.isfinite(origin.alt):
+        if not origin.on_earth:
             return False
         before = f.earth.projection
         altitude_before = f.earth.alt_ref
