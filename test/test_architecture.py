@@ -39,7 +39,7 @@ CORE = {part for parts in LAYERS[:8] for part in parts}
 
 MESSAGES = {
     'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'nav_msgs', 'sensor_msgs',
-    'std_msgs',
+    'std_msgs', 'std_srvs',
 }
 LIBRARIES = {
     'geo': {'pygeomag'},

@@ -17,6 +17,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
+from ekf_fusion_ros.live.steering import Steering
 from ekf_fusion_ros.live.switches import Switches
 from ekf_fusion_ros.live.work_watch import WorkWatch
 from ekf_fusion_ros.node.estimator_numbers import EstimatorNumbers
@@ -31,6 +32,7 @@ from ekf_fusion_ros.node.process import StopRequest
 from ekf_fusion_ros.node.process import make_executor
 from ekf_fusion_ros.node.publishers import Publishers
 from ekf_fusion_ros.node.reporting import Reporting
+from ekf_fusion_ros.node.services import Services
 from ekf_fusion_ros.params.tree import Params
 from ekf_fusion_ros.session import FusionSession
 
@@ -52,7 +54,10 @@ class FusionNode(Node):  # type: ignore[misc]
         self._intake = Intake(node.queue_limit)
         self._work = WorkWatch(1.0 / node.core_rate, STALL_S)
         self._guard = Guard(self, self._work.trouble)
-        self._switches = Switches(node.roles, self._session.inertial_role, enabled=True)
+        self._switches = Switches(
+            node.roles, self._session.inertial_role, enabled=not node.disabled_at_startup)
+        steering = Steering(self._session, self._switches, node.output_frame)
+        Services(self, steering, self._guard, node.roles)
         self._outputs = Publishers(self, self._params)
         self._navigation = NavigationPublisher(self, self._params)
         self._events = EventsPublisher(self)
@@ -62,7 +67,7 @@ class FusionNode(Node):  # type: ignore[misc]
             lambda: len(self._intake))
         self._preparation: Preparation | None = None
         # Not the ROS clock: the filter runs on stamps, also while /clock stands still.
-        self._clock = Clock(clock_type=ClockType.STEADY_TIME)
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
 
     def begin(self, stopped: Callable[[], bool]) -> None:
         """Make the kernels ready, then start; ends early once `stopped` says so.
@@ -101,7 +106,7 @@ class FusionNode(Node):  # type: ignore[misc]
         self.destroy_node()
 
     def _every(self, period: float, work: Callable[[], None]) -> Any:
-        return self.create_timer(period, self._guard(work), clock=self._clock)
+        return self.create_timer(period, self._guard(work), clock=self._steady)
 
     def _queue(self, role: str, message: Any) -> None:
         refusal = self._switches.refusal(role)

@@ -80,6 +80,7 @@ class Reporting:
         reports = [self._estimator.report(health, self._work.trouble, self._queued())]
         reports.append(self._navigation.report(self._session))
         for role, watch in self._inputs.watches.items():
+            watch.switched_on = self._switches.is_on(role)
             reports.append(watch.report(
                 counts[role], now, aids, self._inputs.delay(role, now, ros_now)))
         receiver = receiver_report(health.values)

@@ -59,6 +59,8 @@ class NodeParams:
     estimator_rate: float = param(
         0.0, 'Rate of `~/estimator`: states, variances, innovations, test ratios and resets as '
         'numbers by name; 0 = not published.', unit='Hz', min=0, max=100)
+    disabled_at_startup: bool = param(
+        False, 'Keep all messages from the filter until `enable` or `~/set_enabled` is called.')
     diagnostics_rate: float = param(
         1.0, 'Rate of /diagnostics.', unit='Hz', min=0.1, max=10)
     world_frame: str = param(

@@ -15,9 +15,11 @@ import pytest
 
 rclpy = pytest.importorskip('rclpy')
 
+from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from rcl_interfaces.srv import DescribeParameters
 from rclpy.qos import ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import NavSatFix
 
 from ekf_fusion_ros.node.fusion_node import FusionNode
@@ -135,6 +137,24 @@ def test_silence_is_said(start_fuser: StartFuser, peer: Peer) -> None:
         'waiting for odometry: /odom has 0 messages, 1 reliable publisher')
     assert peer.reports['odometry'].message == 'nothing received on /odom yet'
     assert peer.reports['fix'].message == 'nothing received on /fix yet'
+
+
+def test_diagnostics_are_stamped_by_the_clock_topic(
+    start_fuser: StartFuser, peer: Peer,
+) -> None:
+    fuser = start_fuser({'use_sim_time': True})
+    stamps: list[int] = []
+    peer.node.create_subscription(
+        DiagnosticArray, '/diagnostics', lambda one: stamps.append(one.header.stamp.sec), 10)
+    clock = peer.node.create_publisher(Clock, '/clock', 10)
+    message = Clock()
+    message.clock.sec = 1234
+
+    def stamped() -> bool:
+        clock.publish(message)
+        return 1234 in stamps
+
+    peer.until(stamped, fuser)
 
 
 def bad_odometry() -> dict[str, Odometry]:

@@ -1,0 +1,277 @@
+"""Services and request topics of the running node, and those whose types are not installed."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import TYPE_CHECKING
+from typing import Any
+
+import pytest
+
+rclpy = pytest.importorskip('rclpy')
+
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import NavSatFix
+from std_srvs.srv import Empty
+from std_srvs.srv import SetBool
+from std_srvs.srv import Trigger
+from test_fuser import fix
+from test_fuser import odometry
+
+from ekf_fusion_ros.estimator import GeoPoint
+from ekf_fusion_ros.live.steering import Steering
+from ekf_fusion_ros.live.switches import Switches
+from ekf_fusion_ros.node import services
+from ekf_fusion_ros.node.guard import Guard
+from ekf_fusion_ros.node.optional import TYPES
+from ekf_fusion_ros.node.optional import absence
+from ekf_fusion_ros.params import Params
+from ekf_fusion_ros.session import FusionSession
+
+if TYPE_CHECKING:
+    from fuser_process import Fuser
+    from fuser_process import Peer
+
+StartFuser = Callable[..., 'Fuser']
+
+
+class Operator:
+    """Drives the node along a line and asks things of it."""
+
+    def __init__(self, fuser: Fuser, peer: Peer) -> None:
+        self.fuser = fuser
+        self.peer = peer
+        self.step = 0
+        peer.connect(fuser, {'odom': Odometry, 'fix': NavSatFix})
+
+    def ask(self, kind: Any, name: str, request: Any) -> Any:
+        """Call a service and return its response."""
+        client = self.peer.node.create_client(kind, name)
+        self.peer.until(client.service_is_ready, self.fuser)
+        answer = client.call_async(request)
+        self.peer.until(answer.done, self.fuser)
+        return answer.result()
+
+    def drive(self, steps: int) -> None:
+        """Send tenths of a second; each is counted by the node before the next."""
+        for _ in range(steps):
+            self.step += 1
+            self.peer.publish('odom', odometry(0.1 * self.step))
+            if self.step % 2 == 0:
+                self.peer.publish('fix', fix(0.1 * self.step))
+        self.peer.until(lambda: self.peer.count('odometry') >= self.step, self.fuser)
+
+    def drive_until(self, condition: Callable[[], bool]) -> None:
+        """Drive until something is so."""
+        while not condition():
+            assert self.step < 5000, self.peer.texts()
+            self.drive(20)
+
+    def request(self, kind: type, topic: str, message: Any) -> None:
+        """Publish on a topic of requests once the node listens."""
+        publisher = self.peer.node.create_publisher(kind, topic, 10)
+        self.peer.until(lambda: publisher.get_subscription_count() > 0, self.fuser)
+        publisher.publish(message)
+
+    def hears(self, words: str) -> None:
+        """Wait until the node has said something."""
+        self.peer.until(lambda: words in self.fuser.output, self.fuser)
+
+
+@pytest.fixture
+def operator(start_fuser: StartFuser, peer: Peer) -> Operator:
+    return Operator(start_fuser(), peer)
+
+
+@pytest.mark.slow
+def test_an_aid_is_switched_off_and_on(operator: Operator) -> None:
+    operator.drive(10)
+    answer = operator.ask(SetBool, '/fuser/use_fix', SetBool.Request(data=False))
+    assert (answer.success, answer.message) == (True, 'done')
+    before = operator.peer.count('fix', 'accepted')
+    operator.drive(10)
+    operator.peer.until(
+        lambda: operator.peer.count('fix', 'refused.switched_off') == 5, operator.fuser)
+    assert operator.peer.count('fix', 'accepted') == before
+    assert operator.peer.texts()['fix'].startswith('switched off, ')
+    assert operator.ask(SetBool, '/fuser/use_fix', SetBool.Request(data=True)).success
+    operator.drive(10)
+    operator.peer.until(
+        lambda: operator.peer.count('fix', 'accepted') > before, operator.fuser)
+    answer = operator.ask(SetBool, '/fuser/use_odometry', SetBool.Request(data=False))
+    assert not answer.success
+    assert 'call ~/set_enabled' in answer.message
+
+
+@pytest.mark.slow
+def test_the_fusion_is_disabled_and_enabled(operator: Operator) -> None:
+    operator.drive(10)
+    assert operator.ask(SetBool, '/fuser/set_enabled', SetBool.Request(data=False)).success
+    operator.drive(10)
+    operator.peer.until(
+        lambda: operator.peer.count('odometry', 'refused.disabled') == 10, operator.fuser)
+    assert operator.peer.texts()['estimator'].startswith('disabled')
+    operator.ask(Empty, '/enable', Empty.Request())
+    operator.drive(10)
+    operator.peer.until(
+        lambda: operator.peer.count('odometry', 'accepted') > 10, operator.fuser)
+
+
+@pytest.mark.slow
+def test_a_node_may_start_disabled(start_fuser: StartFuser, peer: Peer) -> None:
+    operator = Operator(start_fuser({'node.disabled_at_startup': True}), peer)
+    operator.drive(5)
+    operator.peer.until(
+        lambda: operator.peer.count('odometry', 'refused.disabled') == 5, operator.fuser)
+
+
+@pytest.mark.slow
+def test_origin_pose_and_reset(operator: Operator) -> None:
+    """The origin is moved by 0.001 deg, then the vehicle told 3 m north, then all begun anew."""
+    peer = operator.peer
+    operator.request(NavSatFix, '/fuser/set_origin', NavSatFix(latitude=99.0))
+    operator.hears('/fuser/set_origin: not done: latitude 99.0')
+    operator.request(PoseWithCovarianceStamped, '/set_pose', given_pose(0.0, 0.0))
+    operator.hears('/set_pose: not done: no pose can be set yet')
+    operator.drive_until(lambda: bool(peer.odometry))
+    operator.request(
+        NavSatFix, '/fuser/set_origin',
+        NavSatFix(latitude=47.001, longitude=8.0, altitude=400.0))
+    operator.hears('origin of the map set on request: latitude 47.001')
+    operator.drive(20)
+    # A thousandth of a degree of latitude is 111.2 m at 47 N.
+    operator.drive_until(lambda: abs(peer.odometry[-1].pose.pose.position.y + 111.2) < 2.0)
+    east = peer.odometry[-1].pose.pose.position.x
+    operator.request(PoseWithCovarianceStamped, '/set_pose', given_pose(east, -108.0))
+    operator.hears('pose set on request')
+    operator.drive_until(lambda: any(
+        abs(one.pose.pose.position.y + 108.0) < 1.0 for one in peer.odometry))
+    answer = operator.ask(Trigger, '/fuser/reset', Trigger.Request())
+    assert (answer.success, answer.message) == (True, 'done')
+    operator.hears('the estimator starts again on request, the origin of the map stays')
+    operator.ask(Empty, '/reset', Empty.Request())
+    assert operator.ask(Trigger, '/fuser/reset_origin', Trigger.Request()).success
+    operator.hears('the estimator starts again on request, the origin of the map is set anew')
+    del peer.odometry[:]
+    operator.drive_until(lambda: bool(peer.odometry))
+    assert 'Traceback' not in operator.fuser.output
+
+
+def given_pose(x: float, y: float) -> PoseWithCovarianceStamped:
+    """Return a position in the map with 1 m of uncertainty."""
+    message = PoseWithCovarianceStamped()
+    message.header.frame_id = 'map'
+    message.pose.pose.position.x, message.pose.pose.position.y = x, y
+    message.pose.covariance[0] = message.pose.covariance[7] = 1.0
+    return message
+
+
+class StandInNode:
+    """Keeps what is offered and said instead of sending it."""
+
+    def __init__(self) -> None:
+        self.offered: dict[str, Callable[..., Any]] = {}
+        self.said: list[str] = []
+
+    def create_service(self, _: Any, name: str, work: Callable[..., Any]) -> None:
+        self.offered[name] = work
+
+    def create_subscription(self, _: Any, name: str, work: Callable[..., Any], __: int) -> None:
+        self.offered[f'topic {name}'] = work
+
+    def resolve_service_name(self, name: str) -> str:
+        return name
+
+    resolve_topic_name = resolve_service_name
+
+    def get_logger(self) -> Any:
+        return SimpleNamespace(
+            info=self.said.append, warning=self.said.append, error=self.said.append)
+
+
+@pytest.fixture
+def full(monkeypatch: pytest.MonkeyPatch) -> tuple[StandInNode, FusionSession]:
+    """Services as on an install that has every type; the map lies about 47 N, 8 E."""
+    monkeypatch.setattr(services, 'found_types', lambda: dict.fromkeys(TYPES, object))
+    roles = ('odometry', 'fix')
+    session = FusionSession(Params(), roles)
+    switches = Switches(roles, 'odometry', enabled=True)
+    node = StandInNode()
+    services.Services(
+        node, Steering(session, switches, 'map'), Guard(node, Counter()), roles)
+    return node, session
+
+
+def point(lat: float, lon: float, alt: float) -> SimpleNamespace:
+    return SimpleNamespace(latitude=lat, longitude=lon, altitude=alt)
+
+
+def test_every_service_of_robot_localization_is_offered(full: Any) -> None:
+    node, _ = full
+    assert {'toggle', 'set_pose', 'datum', 'toLL', 'fromLL', 'reset', 'enable',
+            'topic set_pose', 'topic set_gp_origin'} <= {*node.offered}
+    assert not any('switched off, because' in line for line in node.said)
+
+
+def test_toggle_tells_whether_it_was_news(full: Any) -> None:
+    node, _ = full
+    for on, news in ((True, False), (False, True), (False, False), (True, True)):
+        response = SimpleNamespace(status=None)
+        node.offered['toggle'](SimpleNamespace(on=on), response)
+        assert response.status is news
+
+
+def test_datum_and_origin_topic_set_the_origin(full: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    node, session = full
+    seen: list[GeoPoint] = []
+    monkeypatch.setattr(session, 'set_origin', lambda origin: bool(seen.append(origin) or True))
+    turn = SimpleNamespace(x=0.0, y=0.0, z=0.7, w=0.7)
+    request = SimpleNamespace(
+        geo_pose=SimpleNamespace(position=point(47.0, 8.0, 400.0), orientation=turn))
+    response = SimpleNamespace(success=None, message=None)
+    node.offered['datum'](request, response)
+    assert (response.success, response.message) == (True, 'done')
+    assert any('the orientation is not used' in line for line in node.said)
+    node.offered['datum'](request, SimpleNamespace())
+    node.offered['topic set_gp_origin'](SimpleNamespace(position=point(46.0, 7.0, 1.0)))
+    assert seen == [GeoPoint(47.0, 8.0, 400.0)] * 2 + [GeoPoint(46.0, 7.0, 1.0)]
+
+
+def test_points_go_to_the_earth_and_back(full: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    node, session = full
+    there, back = SimpleNamespace(ll_point=point(0, 0, 0)), SimpleNamespace(
+        map_point=SimpleNamespace(x=0.0, y=0.0, z=0.0))
+    asked = SimpleNamespace(map_point=SimpleNamespace(x=100.0, y=200.0, z=3.0))
+    node.offered['toLL'](asked, there)
+    assert any(line.startswith('toLL: not done: there is no map yet') for line in node.said)
+    monkeypatch.setattr(
+        type(session), 'origin', property(lambda _: GeoPoint(47.0, 8.0, 400.0)))
+    node.offered['toLL'](asked, there)
+    assert there.ll_point.latitude == pytest.approx(47.0 + 200.0 / 111190.0, abs=1e-6)
+    assert there.ll_point.altitude == 403.0
+    node.offered['fromLL'](SimpleNamespace(ll_point=there.ll_point), back)
+    place = back.map_point
+    assert (place.x, place.y, place.z) == pytest.approx((100.0, 200.0, 3.0), abs=1e-3)
+    node.offered['fromLL'](SimpleNamespace(ll_point=point(95.0, 0.0, 0.0)), back)
+    assert 'fromLL: not done: latitude 95.0' in node.said[-1]
+
+
+def test_nothing_leaves_a_callback(full: Any) -> None:
+    node, _ = full
+    response = SimpleNamespace(success=None, message=None)
+    node.offered['~/use_fix'](None, response)
+    assert (response.success, response.message) == (False, services.INTERNAL_ERROR)
+    node.offered['topic set_pose'](None)
+    assert sum('internal error at' in line for line in node.said) == 2
+
+
+def test_absent_types_are_named_with_what_serves_instead() -> None:
+    line = absence({})
+    assert 'geographic_msgs and robot_localization cannot be imported' in line
+    for name in TYPES:
+        assert name in line
+    assert 'toggle (call ~/set_enabled (std_srvs/SetBool))' in line
+    assert absence(dict.fromkeys(TYPES, object)) == ''
