@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 import math
+from typing import Any
 from typing import Protocol
 
 import numpy as np
@@ -162,6 +163,9 @@ class Estimator(Protocol):
 
     def set_origin(self, origin: GeoPoint) -> bool:
         """Move the origin of the local frame; False where the point is unusable."""
+
+    def adopt(self, params: Any) -> None:
+        """Go on with other parameters of its kind, of which only live ones differ."""
 
     def set_pose(self, pose: GivenPose) -> bool:
         """Jump to a pose; False before there is a state that could jump."""

@@ -153,6 +153,11 @@ def make_estimator(params: Params) -> Estimator:
     return Ekf2(params.ekf2)
 
 
+def adopt_params(estimator: Estimator, params: Params) -> None:
+    """Let an estimator of `make_estimator` go on with other parameters."""
+    estimator.adopt(params.ekf2)
+
+
 def make_odometry_imu(params: Params) -> Any:
     """Return what turns odometry into inertial increments."""
     from ekf_fusion_ros.odometry_imu import OdometryImu

@@ -27,6 +27,7 @@ from ekf_fusion_ros.health.status import NavigationStatus
 from ekf_fusion_ros.holding import Holding
 from ekf_fusion_ros.inputs import ROLE_OF_SAMPLE
 from ekf_fusion_ros.inputs import InertialInput
+from ekf_fusion_ros.inputs import adopt_params
 from ekf_fusion_ros.inputs import decoder_of
 from ekf_fusion_ros.inputs import make_estimator
 from ekf_fusion_ros.inputs import make_motion_heading
@@ -92,7 +93,7 @@ class FusionSession:
         self._on_update = on_update
         self._statistics = {role: RoleStatistics() for role in sorted(roles or ())}
         self._events: list[Event] = []
-        self._decoders = {role: decoder_of(role, self.params) for role in self._statistics}
+        self._make_decoders()
         self._inertial_role = IMU if roles is None or IMU in roles else ODOMETRY
         self._local = self._is_local()
         self._gap_notice = self.params.session.gap_notice
@@ -106,6 +107,18 @@ class FusionSession:
         self.milestones: dict[str, int] = {}
         self._navigation = NavigationWatch(self.params, self.roles, local=self._local)
         self._forget()
+
+    def _make_decoders(self) -> None:
+        self._decoders = {role: decoder_of(role, self.params) for role in self._statistics}
+
+    def adopt(self, params: Params) -> None:
+        """Go on with other parameters, which differ from those at the start only in live ones.
+
+        As at the start the roles choose the aiding, and a value other than the default wins.
+        """
+        self.params = params if self.roles is None else configure(params, self.roles)
+        self._make_decoders()
+        adopt_params(self._estimator, self.params)
 
     def _is_local(self) -> bool:
         if self.roles is None:

@@ -51,9 +51,7 @@ class Covariance:
         self._saved_d_body = np.zeros(4)
         self._mag_active = False
         self.limits[ACCEL_BIAS_VARIANCE_MAX] = (0.1 * GRAVITY * FILTER_PERIOD) ** 2
-        imu, mag = params.imu, params.mag
-        dt = FILTER_PERIOD
-        self._accel_var = self._stated_accel_var = (dt * min(imu.accel_noise, 1.0)) ** 2
+        imu = params.imu
         self._bad_axes = NO_AXES
         self._process = np.zeros(1, PROCESS)
         process = self._process[0]
@@ -62,9 +60,16 @@ class Covariance:
         self._learns_no_accel_bias = imu.inhibit_accel_bias
         process['accel_bias_limit'] = imu.accel_bias_limit
         process['peak_limits'] = imu.accel_bias_learn_gyro_limit, imu.accel_bias_learn_accel_limit
-        process['peak_decay'] = 1.0 - dt / imu.accel_bias_learn_time
+        process['peak_decay'] = 1.0 - FILTER_PERIOD / imu.accel_bias_learn_time
         self._velocity_var: Array = process['velocity_var']
-        self._velocity_var[:] = self._accel_var
+        self.set_noise(params)
+
+    def set_noise(self, params: Ekf2Params) -> None:
+        """Predict with the process noise of these parameters from now on."""
+        imu, mag, process = params.imu, params.mag, self._process[0]
+        dt = FILTER_PERIOD
+        self._accel_var = self._stated_accel_var = (dt * min(imu.accel_noise, 1.0)) ** 2
+        self._set_velocity_noise()
         process['angle_var'] = (dt * min(imu.gyro_noise, 1.0)) ** 2
         noise = process['noise']
         noise[10:13] = (dt * dt * imu.gyro_bias_process_noise) ** 2

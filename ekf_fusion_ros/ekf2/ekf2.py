@@ -227,6 +227,15 @@ class Ekf2:
         """Move the origin of the local frame, keeping the place of the vehicle on the earth."""
         return self.control.move_origin(origin)
 
+    def adopt(self, params: Ekf2Params) -> None:
+        """Go on with other parameters, which differ from the present ones only in live ones.
+
+        Raises ValueError, naming the parameter, when one is out of range.
+        """
+        validate(params)
+        self.params = self.filter.params = params
+        self.filter.cov.set_noise(params)
+
     def set_pose(self, pose: GivenPose) -> bool:
         """Jump to a pose of the body origin (NED, m, rad) at the newest IMU sample.
 

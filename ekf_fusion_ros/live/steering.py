@@ -55,6 +55,10 @@ class Steering:
             self._session.announce(f'{role} is switched {"on" if on else "off"} on request')
         return refusal
 
+    def obstacle(self, role: str, on: bool) -> str:
+        """Return why `switch` would refuse, '' where it would not."""
+        return self._switches.obstacle(role, on)
+
     def set_origin(self, point: GeoPoint) -> str:
         """Move the origin of the map; the place of the vehicle on the earth stays."""
         place = f'latitude {point.lat}, longitude {point.lon}, altitude {point.alt}'

@@ -21,13 +21,19 @@ class Switches:
 
     def switch(self, role: str, on: bool) -> str:
         """Switch an input; return '' where that is done, else in one sentence why not."""
-        if role not in self._roles:
+        obstacle = self.obstacle(role, on)
+        if not obstacle and role in self._roles:
+            (self._off.discard if on else self._off.add)(role)
+        return obstacle
+
+    def obstacle(self, role: str, on: bool) -> str:
+        """Return in one sentence why an input cannot be switched, '' where it can."""
+        if role not in self._roles and on:
             return (f'{role} is not subscribed to: start the node with node.use_{role}: true to '
                     'switch it later')
         if role == self._inertial and not on:
             return (f'{role} carries the time of the filter and cannot be switched off alone: '
                     'call ~/set_enabled with data: false to stop the fusion')
-        (self._off.discard if on else self._off.add)(role)
         return ''
 
     def is_on(self, role: str) -> bool:

@@ -19,6 +19,7 @@ from rclpy.utilities import remove_ros_args
 
 from ekf_fusion_ros.live.steering import Steering
 from ekf_fusion_ros.live.switches import Switches
+from ekf_fusion_ros.live.tuning import Tuning
 from ekf_fusion_ros.live.work_watch import WorkWatch
 from ekf_fusion_ros.node.estimator_numbers import EstimatorNumbers
 from ekf_fusion_ros.node.events import EventsPublisher
@@ -26,6 +27,7 @@ from ekf_fusion_ros.node.guard import Guard
 from ekf_fusion_ros.node.inputs import Inputs
 from ekf_fusion_ros.node.intake import Intake
 from ekf_fusion_ros.node.navigation import NavigationPublisher
+from ekf_fusion_ros.node.parameters import accept_changes
 from ekf_fusion_ros.node.parameters import declare_parameters
 from ekf_fusion_ros.node.preparation import Preparation
 from ekf_fusion_ros.node.process import StopRequest
@@ -48,7 +50,8 @@ class FusionNode(Node):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__('fuser', automatically_declare_parameters_from_overrides=True)
-        self._params = effective(declare_parameters(self))
+        declared = declare_parameters(self)
+        self._params = effective(declared)
         node = self._params.node
         self._session = FusionSession(self._params, node.roles)
         self._intake = Intake(node.queue_limit)
@@ -57,6 +60,7 @@ class FusionNode(Node):  # type: ignore[misc]
         self._switches = Switches(
             node.roles, self._session.inertial_role, enabled=not node.disabled_at_startup)
         steering = Steering(self._session, self._switches, node.output_frame)
+        accept_changes(self, Tuning(declared, self._session, steering), self._guard)
         Services(self, steering, self._guard, node.roles)
         self._outputs = Publishers(self, self._params)
         self._navigation = NavigationPublisher(self, self._params)

@@ -9,6 +9,8 @@ from typing import Any
 
 from rclpy.node import Node
 
+INTERNAL_ERROR = 'internal error, see the log of the node'
+
 
 class Guard:
     """Counts an error nobody expected as `internal_errors` and logs each kind once."""

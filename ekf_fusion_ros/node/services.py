@@ -12,6 +12,7 @@ from typing import Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from sensor_msgs.msg import NavSatFix
 from std_srvs.srv import Empty
 from std_srvs.srv import SetBool
@@ -19,12 +20,12 @@ from std_srvs.srv import Trigger
 
 from ekf_fusion_ros.estimator import GeoPoint
 from ekf_fusion_ros.live.steering import Steering
+from ekf_fusion_ros.node.guard import INTERNAL_ERROR
 from ekf_fusion_ros.node.guard import Guard
 from ekf_fusion_ros.node.optional import absence
 from ekf_fusion_ros.node.optional import found_types
 
 REQUEST_DEPTH = 10
-INTERNAL_ERROR = 'internal error, see the log of the node'
 LEVEL_ERROR = 1e-3
 """Length of the vector part of an orientation that is as good as none."""
 
@@ -56,7 +57,7 @@ class Services:
         self._serve(SetBool, '~/set_enabled', lambda request, _: steering.enable(request.data))
         for role in roles:
             self._serve(SetBool, f'~/use_{role}',
-                        lambda request, _, role=role: steering.switch(role, request.data))
+                        lambda request, _, role=role: self._switch(role, request.data))
         self._listen(NavSatFix, '~/set_origin', lambda message: steering.set_origin(
             GeoPoint(message.latitude, message.longitude, message.altitude)))
 
@@ -77,6 +78,11 @@ class Services:
             'fromLL': self._from_ll,
             'set_pose': lambda request, _: self._steering.set_pose(request.pose)}
         self._serve(kind, name, works[name])
+
+    def _switch(self, role: str, on: bool) -> str:
+        """Switch an input through its parameter, so that both tell the same."""
+        result, = self._node.set_parameters([Parameter(f'node.use_{role}', value=bool(on))])
+        return '' if result.successful else str(result.reason)
 
     def _toggle(self, request: Any, response: Any) -> str:
         """Switch the fusion; as in robot_localization the status tells whether that was news."""

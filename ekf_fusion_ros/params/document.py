@@ -25,7 +25,8 @@ HEADER = """\
 /**:
   ros__parameters:
 """
-TABLE_HEAD = ('| name | default | unit | range | what | PX4 |', '|---|---|---|---|---|---|')
+TABLE_HEAD = (
+    '| name | default | unit | range | what | live | PX4 |', '|---|---|---|---|---|---|---|')
 INTRODUCTION = """\
 # Parameters
 
@@ -36,6 +37,10 @@ The names are the same everywhere: ROS 2 parameters of the node, `--set name=val
 FILE` of the replay, and the dataclass tree `ekf_fusion_ros.Params`. Frames and units inside
 `ekf2` are those of PX4: NED earth, FRD body, SI. A PX4 `.params` file and a PX4 log (`.ulg`) are
 read as they are; the last column names what each parameter is called there.
+
+Those marked live can be changed while the node runs (`ros2 param set`): noise, gates and checks
+act from the next measurement on, `node.use_<input>` switches an input that the node listens to. A
+change of any other is refused with the reason.
 """
 
 
@@ -67,6 +72,7 @@ def markdown(params: Params) -> str:
             group = prefix
             lines += [f'\n## {group or "general"}\n', *TABLE_HEAD]
         cells = (f'`{name}`', f'`{yaml_value(value)}`', spec.unit, _range(spec), spec.description,
+                 'yes' if spec.live else '',
                  ', '.join(f'`{px4_name}`' for px4_name in foreign.get(name, ())))
         lines.append('| ' + ' | '.join(cell.replace('|', '\\|') for cell in cells) + ' |')
     return '\n'.join(lines) + '\n'

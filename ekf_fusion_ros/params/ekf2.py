@@ -34,16 +34,16 @@ class ImuParams:
 
     gyro_noise: float = param(
         1.5e-2, 'Rate noise for covariance prediction.', unit='rad/s', min=1e-4, max=1.0,
-        px4='EKF2_GYR_NOISE', ecl='gyro_noise')
+        px4='EKF2_GYR_NOISE', ecl='gyro_noise', live=True)
     accel_noise: float = param(
         0.35, 'Accelerometer noise for covariance prediction.', unit='m/s^2', min=1e-3, max=1.0,
-        px4='EKF2_ACC_NOISE', ecl='accel_noise')
+        px4='EKF2_ACC_NOISE', ecl='accel_noise', live=True)
     gyro_bias_process_noise: float = param(
         1e-3, 'Gyro bias random walk.', unit='rad/s^2', min=0, max=1.0,
-        px4='EKF2_GYR_B_NOISE', ecl='gyro_bias_p_noise')
+        px4='EKF2_GYR_B_NOISE', ecl='gyro_bias_p_noise', live=True)
     accel_bias_process_noise: float = param(
         1e-2, 'Accelerometer bias random walk.', unit='m/s^3', min=0, max=1.0,
-        px4='EKF2_ACC_B_NOISE', ecl='accel_bias_p_noise')
+        px4='EKF2_ACC_B_NOISE', ecl='accel_bias_p_noise', live=True)
     switch_on_gyro_bias: float = param(
         0.1, 'Initial 1-sigma gyro bias.', unit='rad/s', min=0, max=0.5,
         px4='EKF2_GBIAS_INIT', ecl='switch_on_gyro_bias')
@@ -80,33 +80,33 @@ class ImuParams:
 class GnssCheckParams:
     """Receiver quality checks that gate the start of GNSS aiding."""
 
-    nsats: bool = param(True, 'Check the number of satellites.')
-    pdop: bool = param(False, 'Check the position dilution.')
-    hacc: bool = param(True, 'Check the horizontal accuracy.')
-    vacc: bool = param(False, 'Check the vertical accuracy.')
-    sacc: bool = param(True, 'Check the speed accuracy.')
-    hdrift: bool = param(False, 'Check horizontal position drift at rest.')
-    vdrift: bool = param(False, 'Check vertical position drift at rest.')
-    hspeed: bool = param(False, 'Check horizontal speed at rest.')
-    vspeed: bool = param(False, 'Check vertical speed against the filter.')
+    nsats: bool = param(True, 'Check the number of satellites.', live=True)
+    pdop: bool = param(False, 'Check the position dilution.', live=True)
+    hacc: bool = param(True, 'Check the horizontal accuracy.', live=True)
+    vacc: bool = param(False, 'Check the vertical accuracy.', live=True)
+    sacc: bool = param(True, 'Check the speed accuracy.', live=True)
+    hdrift: bool = param(False, 'Check horizontal position drift at rest.', live=True)
+    vdrift: bool = param(False, 'Check vertical position drift at rest.', live=True)
+    hspeed: bool = param(False, 'Check horizontal speed at rest.', live=True)
+    vspeed: bool = param(False, 'Check vertical speed against the filter.', live=True)
     req_hacc: float = param(5.0, 'Largest horizontal accuracy.', unit='m', min=0.1, max=1000,
-                            px4='EKF2_REQ_EPH', ecl='req_hacc')
+                            px4='EKF2_REQ_EPH', ecl='req_hacc', live=True)
     req_vacc: float = param(8.0, 'Largest vertical accuracy.', unit='m', min=0.1, max=1000,
-                            px4='EKF2_REQ_EPV', ecl='req_vacc')
+                            px4='EKF2_REQ_EPV', ecl='req_vacc', live=True)
     req_sacc: float = param(1.0, 'Largest speed accuracy.', unit='m/s', min=0.05, max=50,
-                            px4='EKF2_REQ_SACC', ecl='req_sacc')
+                            px4='EKF2_REQ_SACC', ecl='req_sacc', live=True)
     req_nsats: int = param(6, 'Smallest number of satellites.', min=0, max=60,
-                           px4='EKF2_REQ_NSATS', ecl='req_nsats')
+                           px4='EKF2_REQ_NSATS', ecl='req_nsats', live=True)
     req_pdop: float = param(2.0, 'Largest position dilution.', min=0.5, max=50,
-                            px4='EKF2_REQ_PDOP', ecl='req_pdop')
+                            px4='EKF2_REQ_PDOP', ecl='req_pdop', live=True)
     req_hdrift: float = param(0.3, 'Largest horizontal drift speed.', unit='m/s', min=0.01,
-                              max=10, px4='EKF2_REQ_HDRIFT', ecl='req_hdrift')
+                              max=10, px4='EKF2_REQ_HDRIFT', ecl='req_hdrift', live=True)
     req_vdrift: float = param(0.5, 'Largest vertical drift speed.', unit='m/s', min=0.01,
-                              max=10, px4='EKF2_REQ_VDRIFT', ecl='req_vdrift')
+                              max=10, px4='EKF2_REQ_VDRIFT', ecl='req_vdrift', live=True)
     health_time: float = param(10.0, 'Time the checks must pass before the origin is set.',
-                               unit='s', min=0, max=60)
+                               unit='s', min=0, max=60, live=True)
     start_time: float = param(5.0, 'Time without a failed check before aiding starts.',
-                              unit='s', min=0, max=60)
+                              unit='s', min=0, max=60, live=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,13 +118,13 @@ class GnssParams:
     delay_ms: float = param(110.0, 'Delay of the receiver against the IMU.', unit='ms', min=0,
                             max=1000, px4='EKF2_GPS_DELAY', ecl='gps_delay_ms')
     vel_noise: float = param(0.5, 'Lower limit of the velocity noise.', unit='m/s', min=0.01,
-                             max=10, px4='EKF2_GPS_V_NOISE', ecl='gps_vel_noise')
+                             max=10, px4='EKF2_GPS_V_NOISE', ecl='gps_vel_noise', live=True)
     pos_noise: float = param(0.5, 'Lower limit of the position noise.', unit='m', min=0.01,
-                             max=100, px4='EKF2_GPS_P_NOISE', ecl='gps_pos_noise')
+                             max=100, px4='EKF2_GPS_P_NOISE', ecl='gps_pos_noise', live=True)
     vel_gate: float = param(5.0, 'Innovation gate of velocity.', unit='sigma', min=1, max=100,
-                            px4='EKF2_GPS_V_GATE', ecl='gps_vel_innov_gate')
+                            px4='EKF2_GPS_V_GATE', ecl='gps_vel_innov_gate', live=True)
     pos_gate: float = param(5.0, 'Innovation gate of position.', unit='sigma', min=1, max=100,
-                            px4='EKF2_GPS_P_GATE', ecl='gps_pos_innov_gate')
+                            px4='EKF2_GPS_P_GATE', ecl='gps_pos_innov_gate', live=True)
     thorough_yaw_recovery: bool = param(
         True, 'Where velocities prove the yaw to be false, doubt also the gyro bias and the wind '
         'that it has taught, and prefer the yaw of the EKF-GSF bank, once it is certain, to the '
@@ -134,11 +134,11 @@ class GnssParams:
         'at the origin.')
     reset_at_start: bool = param(
         True, 'Jump to the fix whenever aiding starts. Off, a position that dead reckoning has '
-        'kept since the last fix is corrected instead, where the fix passes the gate.')
+        'kept since the last fix is corrected instead, where the fix passes the gate.', live=True)
     correlation_time: float = param(
         0.0, 'Correlation time of the position errors. The noise of a fix grows as if fixes '
         'inside twice this time told as much as one; 0 = errors are white.', unit='s', min=0,
-        max=300)
+        max=300, live=True)
     position: Vector = param(ZERO, 'Antenna position in the body frame (FRD).', unit='m',
                              ecl='gps_pos_body')
     checks: GnssCheckParams = field(default_factory=GnssCheckParams)
@@ -159,9 +159,9 @@ class VisionParams:
     delay_ms: float = param(175.0, 'Delay of the odometry against the IMU.', unit='ms', min=0,
                             max=1000, px4='EKF2_EV_DELAY', ecl='ev_delay_ms')
     pos_gate: float = param(5.0, 'Innovation gate of position.', unit='sigma', min=1, max=100,
-                            px4='EKF2_EVP_GATE', ecl='ev_pos_innov_gate')
+                            px4='EKF2_EVP_GATE', ecl='ev_pos_innov_gate', live=True)
     vel_gate: float = param(3.0, 'Innovation gate of velocity.', unit='sigma', min=1, max=100,
-                            px4='EKF2_EVV_GATE', ecl='ev_vel_innov_gate')
+                            px4='EKF2_EVV_GATE', ecl='ev_vel_innov_gate', live=True)
     position: Vector = param(ZERO, 'Sensor position in the body frame (FRD).', unit='m',
                              ecl='ev_pos_body')
 
@@ -178,17 +178,20 @@ class MagParams:
     delay_ms: float = param(0.0, 'Delay against the IMU.', unit='ms', min=0, max=300,
                             px4='EKF2_MAG_DELAY', ecl='mag_delay_ms')
     heading_noise: float = param(0.3, 'Noise of the magnetic heading.', unit='rad', min=0.01,
-                                 max=1.0, px4='EKF2_HEAD_NOISE', ecl='mag_heading_noise')
+                                 max=1.0, px4='EKF2_HEAD_NOISE', ecl='mag_heading_noise',
+                                 live=True)
     noise: float = param(0.05, 'Noise of one axis.', unit='G', min=0.001, max=1.0,
-                         px4='EKF2_MAG_NOISE', ecl='mag_noise')
+                         px4='EKF2_MAG_NOISE', ecl='mag_noise', live=True)
     heading_gate: float = param(2.6, 'Innovation gate of heading.', unit='sigma', min=1, max=100,
-                                px4='EKF2_HDG_GATE', ecl='heading_innov_gate')
+                                px4='EKF2_HDG_GATE', ecl='heading_innov_gate', live=True)
     gate: float = param(3.0, 'Innovation gate of the three axes.', unit='sigma', min=1, max=100,
-                        px4='EKF2_MAG_GATE', ecl='mag_innov_gate')
+                        px4='EKF2_MAG_GATE', ecl='mag_innov_gate', live=True)
     earth_process_noise: float = param(1e-3, 'Earth field random walk.', unit='G/s', min=0,
-                                       max=0.1, px4='EKF2_MAG_E_NOISE', ecl='mage_p_noise')
+                                       max=0.1, px4='EKF2_MAG_E_NOISE', ecl='mage_p_noise',
+                                       live=True)
     body_process_noise: float = param(1e-4, 'Body field random walk.', unit='G/s', min=0,
-                                      max=0.1, px4='EKF2_MAG_B_NOISE', ecl='magb_p_noise')
+                                      max=0.1, px4='EKF2_MAG_B_NOISE', ecl='magb_p_noise',
+                                      live=True)
     declination_deg: float = param(0.0, 'Declination where the field table is not used.',
                                    unit='deg', min=-180, max=180, px4='EKF2_MAG_DECL',
                                    ecl='mag_declination_deg')
@@ -196,20 +199,21 @@ class MagParams:
     declination_always: bool = param(True, 'Fuse the declination also while GNSS is used.')
     acceleration_gate: float = param(0.5, 'Horizontal acceleration that makes yaw observable.',
                                      unit='m/s^2', min=0, max=5, px4='EKF2_MAG_ACCLIM',
-                                     ecl='mag_acc_gate')
+                                     ecl='mag_acc_gate', live=True)
     yaw_rate_gate: float = param(0.25, 'Yaw rate that makes the body field observable.',
                                  unit='rad/s', min=0, max=5, px4='EKF2_MAG_YAWLIM',
-                                 ecl='mag_yaw_rate_gate')
+                                 ecl='mag_yaw_rate_gate', live=True)
     synthesize_z: bool = param(False, 'Replace the z axis by the one the field table gives.')
-    check_strength: bool = param(False, 'Do not use a field of implausible strength.')
+    check_strength: bool = param(False, 'Do not use a field of implausible strength.', live=True)
     strength_tolerance: float = param(
         0.2, 'Plausible deviation of the strength from that of the field model.', unit='G',
-        min=0.01, max=1.0, px4='EKF2_MAG_CHK_STR')
+        min=0.01, max=1.0, px4='EKF2_MAG_CHK_STR', live=True)
     check_inclination: bool = param(
-        False, 'Do not use a field of implausible inclination at the attitude of the filter.')
+        False, 'Do not use a field of implausible inclination at the attitude of the filter.',
+        live=True)
     inclination_tolerance: float = param(
         20.0, 'Plausible deviation of the inclination from that of the field model.', unit='deg',
-        min=0, max=90, px4='EKF2_MAG_CHK_INC')
+        min=0, max=90, px4='EKF2_MAG_CHK_INC', live=True)
     field_model: str = param('ecl_table', 'Source of declination, inclination and strength.',
                              choices=('ecl_table', 'wmm'))
 
@@ -221,9 +225,9 @@ class BaroParams:
     delay_ms: float = param(0.0, 'Delay against the IMU.', unit='ms', min=0, max=300,
                             px4='EKF2_BARO_DELAY', ecl='baro_delay_ms')
     noise: float = param(2.0, 'Height noise.', unit='m', min=0.01, max=15,
-                         px4='EKF2_BARO_NOISE', ecl='baro_noise')
+                         px4='EKF2_BARO_NOISE', ecl='baro_noise', live=True)
     gate: float = param(5.0, 'Innovation gate of barometric and GNSS height.', unit='sigma',
-                        min=1, max=100, px4='EKF2_BARO_GATE', ecl='baro_innov_gate')
+                        min=1, max=100, px4='EKF2_BARO_GATE', ecl='baro_innov_gate', live=True)
     pressure_error_forward: float = param(
         0.0, 'Static pressure error over dynamic pressure of the airflow from ahead.', min=-2,
         max=2, px4='EKF2_PCOEF_XP', ecl='static_pressure_coef_xp')
@@ -287,17 +291,17 @@ class RangeParams:
     delay_ms: float = param(5.0, 'Delay against the IMU.', unit='ms', min=0, max=300,
                             px4='EKF2_RNG_DELAY', ecl='range_delay_ms')
     noise: float = param(0.1, 'Range noise.', unit='m', min=0.01, max=10, px4='EKF2_RNG_NOISE',
-                         ecl='range_noise')
+                         ecl='range_noise', live=True)
     noise_by_range: float = param(0.0, 'Growth of the noise with range.', unit='m/m', min=0,
-                                  max=0.2, px4='EKF2_RNG_SFE', ecl='range_noise_scaler')
+                                  max=0.2, px4='EKF2_RNG_SFE', ecl='range_noise_scaler', live=True)
     gate: float = param(5.0, 'Innovation gate of range height and terrain.', unit='sigma', min=1,
-                        max=100, px4='EKF2_RNG_GATE', ecl='range_innov_gate')
+                        max=100, px4='EKF2_RNG_GATE', ecl='range_innov_gate', live=True)
     pitch: float = param(0.0, 'Pitch of the sensor axis against body down, nose up positive.',
                          unit='rad', min=-0.75, max=0.75, px4='EKF2_RNG_PITCH',
                          ecl='rng_sens_pitch')
     min_cos_tilt: float = param(0.7071, 'Cosine of the tilt of the sensor axis beyond which '
                                 'range (and optical flow) are not used.', min=0.0, max=1.0,
-                                ecl='range_cos_max_tilt')
+                                ecl='range_cos_max_tilt', live=True)
     good_quality_time: float = param(1.0, 'Time without bad quality before range is used again.',
                                      unit='s', min=0.1, max=5, px4='EKF2_RNG_QLTY_T',
                                      ecl='range_valid_quality_s')
@@ -305,12 +309,13 @@ class RangeParams:
                       'whatever the height reference is.')
     aid_max_height: float = param(5.0, 'Height above ground up to which range aid acts.',
                                   unit='m', min=0.1, max=100, px4='EKF2_RNG_A_HMAX',
-                                  ecl='max_hagl_for_range_aid')
+                                  ecl='max_hagl_for_range_aid', live=True)
     aid_max_speed: float = param(1.0, 'Horizontal speed up to which range aid acts.', unit='m/s',
                                  min=0.1, max=20, px4='EKF2_RNG_A_VMAX',
-                                 ecl='max_vel_for_range_aid')
+                                 ecl='max_vel_for_range_aid', live=True)
     aid_gate: float = param(1.0, 'Terrain innovation up to which range aid acts.', unit='sigma',
-                            min=0.1, max=5, px4='EKF2_RNG_A_IGATE', ecl='range_aid_innov_gate')
+                            min=0.1, max=5, px4='EKF2_RNG_A_IGATE', ecl='range_aid_innov_gate',
+                            live=True)
     position: Vector = param(ZERO, 'Sensor position in the body frame (FRD).', unit='m',
                              ecl='rng_pos_body')
 
@@ -324,16 +329,16 @@ class FlowParams:
                             min=0, max=300, px4='EKF2_OF_DELAY', ecl='flow_delay_ms')
     noise: float = param(0.15, 'Noise at the best quality, at least 0.05.', unit='rad/s',
                          min=0.01, max=10,
-                         px4='EKF2_OF_N_MIN', ecl='flow_noise')
+                         px4='EKF2_OF_N_MIN', ecl='flow_noise', live=True)
     noise_at_min_quality: float = param(0.5, 'Noise at the lowest quality that is used.',
                                         unit='rad/s', min=0.01, max=10, px4='EKF2_OF_N_MAX',
-                                        ecl='flow_noise_qual_min')
+                                        ecl='flow_noise_qual_min', live=True)
     min_quality: int = param(1, 'Lowest quality that is used.', min=0, max=255,
-                             px4='EKF2_OF_QMIN', ecl='flow_qual_min')
+                             px4='EKF2_OF_QMIN', ecl='flow_qual_min', live=True)
     gate: float = param(3.0, 'Innovation gate.', unit='sigma', min=1, max=100,
-                        px4='EKF2_OF_GATE', ecl='flow_innov_gate')
+                        px4='EKF2_OF_GATE', ecl='flow_innov_gate', live=True)
     max_rate: float = param(2.5, 'Largest rate that the sensor can follow.', unit='rad/s', min=0,
-                            max=100)
+                            max=100, live=True)
     opposed_gyro: bool = param(
         True, 'Learn the bias of a gyro in the sensor from its sum with the rotation of the '
         'vehicle, as it gives minus the rotation; off, from their difference as in PX4, which '
@@ -348,28 +353,29 @@ class AirDataParams:
 
     airspeed_noise: float = param(1.4, 'Noise of equivalent airspeed, taken to be 0.5 to 5.',
                                   unit='m/s', min=0.1, max=20, px4='EKF2_EAS_NOISE',
-                                  ecl='eas_noise')
+                                  ecl='eas_noise', live=True)
     airspeed_gate: float = param(5.0, 'Innovation gate of airspeed.', unit='sigma', min=1,
-                                 max=100, px4='EKF2_TAS_GATE', ecl='tas_innov_gate')
+                                 max=100, px4='EKF2_TAS_GATE', ecl='tas_innov_gate', live=True)
     use_sideslip: bool = param(
         True, 'Take the sideslip of fixed wings in flight to be zero on average.')
     sideslip_noise: float = param(0.3, 'Noise of the assumption of zero sideslip.', unit='rad',
-                                  min=0.01, max=1.0, px4='EKF2_BETA_NOISE', ecl='beta_noise')
+                                  min=0.01, max=1.0, px4='EKF2_BETA_NOISE', ecl='beta_noise',
+                                  live=True)
     sideslip_gate: float = param(5.0, 'Innovation gate of sideslip.', unit='sigma', min=1,
-                                 max=100, px4='EKF2_BETA_GATE', ecl='beta_innov_gate')
+                                 max=100, px4='EKF2_BETA_GATE', ecl='beta_innov_gate', live=True)
     use_drag: bool = param(False, 'Estimate wind from the drag of a multirotor.')
     drag_noise: float = param(2.5, 'Variance of the drag model, at least 0.5.',
                               unit='(m/s^2)^2', min=0.01, max=100, px4='EKF2_DRAG_NOISE',
-                              ecl='drag_noise')
+                              ecl='drag_noise', live=True)
     ballistic_coef_x: float = param(
         100.0, 'Mass over drag area of the airflow along x; up to 1 = no such drag.',
-        unit='kg/m^2', min=0, max=200, px4='EKF2_BCOEF_X', ecl='bcoef_x')
+        unit='kg/m^2', min=0, max=200, px4='EKF2_BCOEF_X', ecl='bcoef_x', live=True)
     ballistic_coef_y: float = param(
         100.0, 'Mass over drag area of the airflow along y; up to 1 = no such drag.',
-        unit='kg/m^2', min=0, max=200, px4='EKF2_BCOEF_Y', ecl='bcoef_y')
+        unit='kg/m^2', min=0, max=200, px4='EKF2_BCOEF_Y', ecl='bcoef_y', live=True)
     momentum_drag_coef: float = param(
         0.1, 'Drag of the propellers per airspeed across their axis; up to 0.001 = none.',
-        unit='1/s', min=0, max=1.0, px4='EKF2_MCOEF', ecl='mcoef')
+        unit='1/s', min=0, max=1.0, px4='EKF2_MCOEF', ecl='mcoef', live=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -378,7 +384,7 @@ class AidingParams:
 
     pos_noaid_noise: float = param(10.0, 'Position noise without horizontal aiding.', unit='m',
                                    min=0.5, max=100, px4='EKF2_NOAID_NOISE',
-                                   ecl='pos_noaid_noise')
+                                   ecl='pos_noaid_noise', live=True)
     valid_timeout: float = param(5.0, 'Dead reckoning after which the output is not valid.',
                                  unit='s', min=0.5, max=600, px4='EKF2_NOAID_TOUT')
     vehicle: str = param(
@@ -389,13 +395,14 @@ class AidingParams:
         True, 'Take a moving vehicle to be in the air, one at rest to be on the ground, until a '
         'landed sample says which.')
     reset_timeout: float = param(7.0, 'Time without accepted aiding before a reset.', unit='s',
-                                 min=1, max=60)
+                                 min=1, max=60, live=True)
     position_drift: float = param(
         0.0, 'Random walk of the horizontal position by distance travelled (by time above 1 m/s), '
         'for inertial input whose velocity is wrong for long (scale, slip).', unit='m/sqrt(m)',
-        min=0, max=10)
+        min=0, max=10, live=True)
     yaw_drift: float = param(
-        0.0, 'Random walk of yaw beside the gyro noise.', unit='rad/sqrt(s)', min=0, max=1)
+        0.0, 'Random walk of yaw beside the gyro noise.', unit='rad/sqrt(s)', min=0, max=1,
+        live=True)
     hold_yaw: str = param(
         'unaided', 'Bound the yaw variance by a pseudo measurement while nothing measures yaw: '
         'always; while GNSS in flight does not tell it either (unaided); never.',
@@ -410,7 +417,7 @@ class AidingParams:
     auxvel_delay_ms: float = param(5.0, 'Delay of the auxiliary velocity.', unit='ms', min=0,
                                    max=300, px4='EKF2_AVEL_DELAY', ecl='auxvel_delay_ms')
     wind_process_noise: float = param(0.1, 'Wind random walk.', unit='m/s^2', min=0, max=1.0,
-                                      px4='EKF2_WIND_NOISE', ecl='wind_vel_p_noise')
+                                      px4='EKF2_WIND_NOISE', ecl='wind_vel_p_noise', live=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -41,19 +41,20 @@ class OdometryMessageParams:
         'in a URDF.', unit='rad', min=-6.2832, max=6.2832)
     position_noise: float = param(
         0.1, 'Position noise where the covariance is zero, which means unknown.', unit='m',
-        min=0.001, max=100, px4='EKF2_EVP_NOISE')
+        min=0.001, max=100, px4='EKF2_EVP_NOISE', live=True)
     velocity_noise: float = param(
         0.1, 'Velocity noise where the covariance is zero, which means unknown.', unit='m/s',
-        min=0.001, max=100, px4='EKF2_EVV_NOISE')
+        min=0.001, max=100, px4='EKF2_EVV_NOISE', live=True)
     yaw_noise: float = param(
         0.1, 'Yaw noise where the covariance is zero, which means unknown.', unit='rad',
-        min=0.001, max=3.2, px4='EKF2_EVA_NOISE')
+        min=0.001, max=3.2, px4='EKF2_EVA_NOISE', live=True)
     unmeasured_variance: float = param(
         9e4, 'Variance from which an axis counts as not measured; drivers write 99999 or 1e6.',
         min=1, max=1e12)
     lateral_velocity_noise: float = param(
         0.3, 'Velocity noise of body axes that an odometry of wheels does not measure: the '
-        'vehicle is taken to move along the measured ones.', unit='m/s', min=0.01, max=100)
+        'vehicle is taken to move along the measured ones.', unit='m/s', min=0.01, max=100,
+        live=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,13 +64,17 @@ class FixMessageParams:
     mount_xyz: Vector = param(
         ZERO, 'Position of the antenna in the body frame (FLU, REP-103).', unit='m')
     default_eph: float = param(
-        1.0, 'Horizontal accuracy of a fix of unknown covariance.', unit='m', min=0.01, max=1000)
+        1.0, 'Horizontal accuracy of a fix of unknown covariance.', unit='m', min=0.01, max=1000,
+        live=True)
     default_epv: float = param(
-        4.0, 'Vertical accuracy of a fix of unknown covariance.', unit='m', min=0.01, max=1000)
+        4.0, 'Vertical accuracy of a fix of unknown covariance.', unit='m', min=0.01, max=1000,
+        live=True)
     min_eph: float = param(
-        0.01, 'Smallest horizontal accuracy that is believed.', unit='m', min=1e-4, max=1000)
+        0.01, 'Smallest horizontal accuracy that is believed.', unit='m', min=1e-4, max=1000,
+        live=True)
     min_epv: float = param(
-        0.01, 'Smallest vertical accuracy that is believed.', unit='m', min=1e-4, max=1000)
+        0.01, 'Smallest vertical accuracy that is believed.', unit='m', min=1e-4, max=1000,
+        live=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,9 +83,10 @@ class FixVelocityMessageParams:
 
     default_accuracy: float = param(
         0.5, 'Speed accuracy where the covariance is zero or absent.', unit='m/s', min=0.01,
-        max=100)
+        max=100, live=True)
     min_accuracy: float = param(
-        0.01, 'Smallest speed accuracy that is believed.', unit='m/s', min=1e-4, max=100)
+        0.01, 'Smallest speed accuracy that is believed.', unit='m/s', min=1e-4, max=100,
+        live=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,33 +16,36 @@ SWITCH = 'use_'
 class NodeParams:
     """The node `fuser`. Topics are renamed by remapping, not by parameters."""
 
-    use_odometry: bool = param(True, 'Subscribe to `odom` (nav_msgs/Odometry).')
-    use_fix: bool = param(True, 'Subscribe to `fix` (sensor_msgs/NavSatFix).')
-    use_imu: bool = param(False, 'Subscribe to `imu` (sensor_msgs/Imu).')
+    use_odometry: bool = param(True, 'Subscribe to `odom` (nav_msgs/Odometry).', live=True)
+    use_fix: bool = param(True, 'Subscribe to `fix` (sensor_msgs/NavSatFix).', live=True)
+    use_imu: bool = param(False, 'Subscribe to `imu` (sensor_msgs/Imu).', live=True)
     use_fix_velocity: bool = param(
-        False, 'Subscribe to `fix_velocity` (velocity of the receiver, ENU).')
+        False, 'Subscribe to `fix_velocity` (velocity of the receiver, ENU).', live=True)
     fix_velocity_type: str = param(
         'twist_with_covariance', 'Message of `fix_velocity`: TwistWithCovarianceStamped or '
         'TwistStamped.', choices=TWIST_TYPES)
-    use_magnetic_field: bool = param(False, 'Subscribe to `mag` (sensor_msgs/MagneticField).')
-    use_pressure: bool = param(False, 'Subscribe to `pressure` (sensor_msgs/FluidPressure).')
-    use_range: bool = param(False, 'Subscribe to `range` (sensor_msgs/Range, downwards).')
+    use_magnetic_field: bool = param(
+        False, 'Subscribe to `mag` (sensor_msgs/MagneticField).', live=True)
+    use_pressure: bool = param(
+        False, 'Subscribe to `pressure` (sensor_msgs/FluidPressure).', live=True)
+    use_range: bool = param(
+        False, 'Subscribe to `range` (sensor_msgs/Range, downwards).', live=True)
     use_flow: bool = param(
         False, 'Subscribe to `flow` (optical flow as geometry_msgs/Vector3Stamped: x, y rates in '
-        'rad/s, z quality 0..1).')
-    use_airspeed: bool = param(False, 'Subscribe to `airspeed` (linear.x of a twist).')
+        'rad/s, z quality 0..1).', live=True)
+    use_airspeed: bool = param(False, 'Subscribe to `airspeed` (linear.x of a twist).', live=True)
     airspeed_type: str = param(
         'twist_with_covariance', 'Message of `airspeed`: TwistWithCovarianceStamped or '
         'TwistStamped.', choices=TWIST_TYPES)
-    use_landed: bool = param(False, 'Subscribe to `landed` (std_msgs/Bool).')
-    use_armed: bool = param(False, 'Subscribe to `armed` (std_msgs/Bool).')
+    use_landed: bool = param(False, 'Subscribe to `landed` (std_msgs/Bool).', live=True)
+    use_armed: bool = param(False, 'Subscribe to `armed` (std_msgs/Bool).', live=True)
     use_gps_heading: bool = param(
-        False, 'Subscribe to `gps_heading` (heading of a receiver with two antennas).')
+        False, 'Subscribe to `gps_heading` (heading of a receiver with two antennas).', live=True)
     gps_heading_type: str = param(
         'pose_with_covariance', 'Message of `gps_heading`: PoseWithCovarianceStamped, '
         'PoseStamped or Imu.', choices=HEADING_TYPES)
     use_aux_velocity: bool = param(
-        False, 'Subscribe to `aux_velocity` (velocity against a target at rest, ENU).')
+        False, 'Subscribe to `aux_velocity` (velocity against a target at rest, ENU).', live=True)
     aux_velocity_type: str = param(
         'twist_with_covariance', 'Message of `aux_velocity`: TwistWithCovarianceStamped or '
         'TwistStamped.', choices=TWIST_TYPES)

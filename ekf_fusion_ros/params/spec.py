@@ -15,7 +15,8 @@ class ParamSpec:
     """What is known of one parameter beside its value.
 
     `px4` is the PX4 parameter name, `ecl` the name in the ECL library's parameter struct;
-    both are empty where no single foreign name has the same meaning.
+    both are empty where no single foreign name has the same meaning. `live` parameters may be
+    changed while the filter runs.
     """
 
     description: str
@@ -25,6 +26,7 @@ class ParamSpec:
     choices: tuple[str, ...] = ()
     px4: str = ''
     ecl: str = ''
+    live: bool = False
 
     def check(self, name: str, value: Any) -> None:
         """Raise ValueError, naming the parameter, when a value is outside its domain."""
@@ -51,9 +53,10 @@ def param(
     choices: Sequence[str] = (),
     px4: str = '',
     ecl: str = '',
+    live: bool = False,
 ) -> Any:
     """Declare a dataclass field that is a parameter."""
-    spec = ParamSpec(description, unit, min, max, tuple(choices), px4, ecl)
+    spec = ParamSpec(description, unit, min, max, tuple(choices), px4, ecl, live)
     return dataclasses.field(default=default, metadata={'spec': spec})
 
 

@@ -125,7 +125,7 @@ def test_parameters_are_described_to_other_nodes(start_fuser: StartFuser, peer: 
     answer = client.call_async(DescribeParameters.Request(names=['ekf2.gnss.delay_ms']))
     peer.until(answer.done, fuser)
     descriptor = answer.result().descriptors[0]
-    assert descriptor.read_only
+    assert not descriptor.read_only
     assert 'unit: ms' in descriptor.additional_constraints
     assert descriptor.floating_point_range[0].to_value > 0
 

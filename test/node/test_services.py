@@ -14,6 +14,10 @@ rclpy = pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
+from rcl_interfaces.srv import GetParameters
+from rcl_interfaces.srv import SetParameters
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.parameter import Parameter
 from sensor_msgs.msg import NavSatFix
 from std_srvs.srv import Empty
 from std_srvs.srv import SetBool
@@ -76,6 +80,21 @@ class Operator:
         self.peer.until(lambda: publisher.get_subscription_count() > 0, self.fuser)
         publisher.publish(message)
 
+    def values(self, *names: str) -> list[Any]:
+        """Return the values of parameters."""
+        answer = self.ask(
+            GetParameters, '/fuser/get_parameters', GetParameters.Request(names=names))
+        return [Parameter.from_parameter_msg(one).value for one in (
+            SimpleNamespace(name=name, value=value)
+            for name, value in zip(names, answer.values, strict=True))]
+
+    def change(self, **values: Any) -> list[str]:
+        """Set parameters one by one (__ is a dot); return the reasons of refusal."""
+        request = SetParameters.Request(parameters=as_messages(values))
+        answer = self.ask(SetParameters, '/fuser/set_parameters', request)
+        assert all(one.successful is not bool(one.reason) for one in answer.results)
+        return [one.reason for one in answer.results]
+
     def hears(self, words: str) -> None:
         """Wait until the node has said something."""
         self.peer.until(lambda: words in self.fuser.output, self.fuser)
@@ -97,6 +116,7 @@ def test_an_aid_is_switched_off_and_on(operator: Operator) -> None:
         lambda: operator.peer.count('fix', 'refused.switched_off') == 5, operator.fuser)
     assert operator.peer.count('fix', 'accepted') == before
     assert operator.peer.texts()['fix'].startswith('switched off, ')
+    assert operator.values('node.use_fix') == [False]
     assert operator.ask(SetBool, '/fuser/use_fix', SetBool.Request(data=True)).success
     operator.drive(10)
     operator.peer.until(
@@ -160,6 +180,65 @@ def test_origin_pose_and_reset(operator: Operator) -> None:
     assert 'Traceback' not in operator.fuser.output
 
 
+@pytest.mark.slow
+def test_live_parameters_change_and_others_say_why_not(operator: Operator) -> None:
+    operator.drive(5)
+    assert operator.change(ekf2__gnss__pos_gate=4.0, messages__fix__default_eph=2.0) == ['', '']
+    operator.hears('parameters changed on request: ekf2.gnss.pos_gate = 4.0 (was 5.0)')
+    operator.hears('parameters changed on request: messages.fix.default_eph = 2.0 (was 1.0)')
+    assert operator.values('ekf2.gnss.pos_gate', 'messages.fix.default_eph') == [4.0, 2.0]
+    frame, delay, rate, same = operator.change(
+        node__map_frame='world', ekf2__gnss__delay_ms=50.0, session__output_rate=10.0,
+        node__odom_frame='odom')
+    assert frame == (
+        "node.map_frame = 'map' cannot become 'world' while the node runs: topics are open and "
+        'listeners rely on their types and frames; set it in the parameter file and start the '
+        'node again')
+    assert 'fusion horizon' in delay
+    assert 'session.output_rate = 50.0 cannot become 10.0' in rate
+    assert same == ''
+    assert operator.values('node.map_frame', 'ekf2.gnss.delay_ms') == ['map', 110.0]
+
+
+@pytest.mark.slow
+def test_a_list_of_parameters_changes_as_a_whole_or_not_at_all(operator: Operator) -> None:
+    def change(**values: Any) -> Any:
+        request = SetParametersAtomically.Request(parameters=as_messages(values))
+        return operator.ask(
+            SetParametersAtomically, '/fuser/set_parameters_atomically', request).result
+
+    names = 'ekf2.gnss.vel_gate', 'ekf2.vision.vel_gate'
+    before = operator.values(*names)
+    refused = change(ekf2__gnss__vel_gate=3.5, ekf2__earth__projection='sphere')
+    assert not refused.successful
+    assert 'ekf2.earth.projection' in refused.reason
+    assert operator.values(*names) == before
+    assert change(ekf2__gnss__vel_gate=3.5, ekf2__vision__vel_gate=2.5).successful
+    assert operator.values(*names) == [3.5, 2.5]
+    operator.drive(5)
+    operator.hears('ekf2.gnss.vel_gate = 3.5 (was 5.0), ekf2.vision.vel_gate = 2.5 (was 3.0)')
+
+
+@pytest.mark.slow
+def test_an_input_is_a_parameter_too(operator: Operator) -> None:
+    operator.drive(10)
+    fix_off, odometry_off, range_on, range_off = operator.change(
+        node__use_fix=False, node__use_odometry=False, node__use_range=True,
+        node__use_imu=False)
+    assert (fix_off, range_off) == ('', '')
+    assert 'carries the time of the filter' in odometry_off
+    assert 'is not subscribed to' in range_on
+    operator.drive(10)
+    operator.peer.until(
+        lambda: operator.peer.count('fix', 'refused.switched_off') == 5, operator.fuser)
+
+
+def as_messages(values: dict[str, Any]) -> list[Any]:
+    """Return parameters as messages; __ in a name is a dot."""
+    return [Parameter(name.replace('__', '.'), value=value).to_parameter_msg()
+            for name, value in values.items()]
+
+
 def given_pose(x: float, y: float) -> PoseWithCovarianceStamped:
     """Return a position in the map with 1 m of uncertainty."""
     message = PoseWithCovarianceStamped()
@@ -186,6 +265,9 @@ class StandInNode:
         return name
 
     resolve_topic_name = resolve_service_name
+
+    def set_parameters(self, parameters: Any) -> Any:
+        raise RuntimeError('as on an internal error')
 
     def get_logger(self) -> Any:
         return SimpleNamespace(
@@ -262,7 +344,7 @@ def test_points_go_to_the_earth_and_back(full: Any, monkeypatch: pytest.MonkeyPa
 def test_nothing_leaves_a_callback(full: Any) -> None:
     node, _ = full
     response = SimpleNamespace(success=None, message=None)
-    node.offered['~/use_fix'](None, response)
+    node.offered['~/use_fix'](SimpleNamespace(data=True), response)
     assert (response.success, response.message) == (False, services.INTERNAL_ERROR)
     node.offered['topic set_pose'](None)
     assert sum('internal error at' in line for line in node.said) == 2

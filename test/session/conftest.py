@@ -68,6 +68,9 @@ class RecordingEstimator:
         self.origin = origin
         return True
 
+    def adopt(self, params):
+        self.params = params
+
     def set_pose(self, pose):
         self.poses.append(pose)
         return True

@@ -12,6 +12,7 @@ from ekf_fusion_ros.map_origin import map_of_point
 from ekf_fusion_ros.map_origin import point_of_map
 from ekf_fusion_ros.params import Params
 from ekf_fusion_ros.params import with_overrides
+from ekf_fusion_ros.samples import GnssSample
 from ekf_fusion_ros.session import FusionSession
 
 START = 1000.0
@@ -99,6 +100,18 @@ def test_without_a_fix_the_local_frame_takes_a_pose(build, estimator):
     session = session_of(estimator, ('imu', 'odometry'))
     drive(session, build, START, START + 1)
     assert session.set_pose(POSE)
+
+
+def test_adopted_parameters_reach_decoders_and_estimator(build, estimator):
+    session = session_of(estimator)
+    drive(session, build, START, START + 1)
+    session.adopt(with_overrides(Params(), {
+        'messages.fix.min_eph': 3.0, 'ekf2.gnss.pos_gate': 4.0}))
+    drive(session, build, START + 1.01, START + 2)
+    assert [fix.eph for fix in estimator.of(GnssSample)] == [1.0, 3.0]
+    assert estimator.params.gnss.pos_gate == 4.0
+    # What the roles have chosen stays chosen.
+    assert estimator.params.mag.type == 'none'
 
 
 @pytest.mark.parametrize('projection', ['wgs84', 'sphere'])
