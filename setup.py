@@ -54,7 +54,7 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
-        (f'share/{package_name}/config', sorted(glob('config/*.yaml'))),
+        (f'share/{package_name}/config', sorted(glob('config/*.*'))),
         (f'share/{package_name}/launch', sorted(glob('launch/*.launch.py'))),
     ],
     install_requires=['numpy>=1.26', 'PyYAML'],

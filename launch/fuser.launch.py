@@ -5,6 +5,8 @@ ros2 launch ekf_fusion_ros fuser.launch.py odom:=/vio/odometry fix:=/gps/fix
 Every topic can be renamed by an argument of its name; --show-args lists them.
 """
 
+from pathlib import Path
+
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.actions import OpaqueFunction
@@ -16,6 +18,8 @@ TOPICS = (
     'armed', 'gps_heading', 'aux_velocity', 'odometry/filtered', 'odometry/gps', 'gps/filtered')
 
 ARGUMENTS = {
+    'preset': ('', 'File of config/ for a source of odometry, without .yaml: vins_fusion, '
+               'openvins, isaac_visual_slam, rtabmap, zed, wheel_odometry, mavros.'),
     'params_file': ('', 'ROS 2 YAML with parameters; config/default.yaml lists all of them.'),
     'namespace': ('', 'Namespace of the node and of its topics.'),
     'use_sim_time': ('false', 'Take timers from /clock; stamps of messages count either way.'),
@@ -28,11 +32,18 @@ def argument_of(topic):
     return topic.replace('/', '_')
 
 
+def preset(name):
+    """Return the file of a preset, which lies beside the folder of this one."""
+    return Path(__file__).resolve().parents[1] / 'config' / f'{name}.yaml'
+
+
 def start(context):
     """Return the node as the arguments want it."""
     value = {name: LaunchConfiguration(name).perform(context)
              for name in (*ARGUMENTS, *map(argument_of, TOPICS))}
-    parameters = [value['params_file']] if value['params_file'] else []
+    parameters = [str(preset(value['preset']))] if value['preset'] else []
+    if value['params_file']:
+        parameters.append(value['params_file'])
     parameters.append({'use_sim_time': value['use_sim_time'].lower() in ('true', '1')})
     renamed = [(topic, value[argument_of(topic)]) for topic in TOPICS]
     return [Node(

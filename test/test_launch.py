@@ -81,3 +81,26 @@ def test_every_input_of_the_node_can_be_renamed(launch: Launch) -> None:
     node = launch(**{topic: f'/robot/{topic}' for topic in inputs})
     assert sorted(node['remappings']) == sorted(
         (topic, f'/robot/{topic}') for topic in inputs)
+
+
+PRESETS = ('vins_fusion', 'openvins', 'isaac_visual_slam', 'rtabmap', 'zed', 'wheel_odometry',
+           'mavros')
+
+
+@pytest.mark.parametrize('name', PRESETS)
+def test_a_preset_is_a_file_that_goes_before_the_users_own(launch: Launch, name: str) -> None:
+    node = launch(preset=name, params_file='mine.yaml')
+    file, *rest = node['parameters']
+    assert Path(file).is_file()
+    assert rest == ['mine.yaml', {'use_sim_time': False}]
+    text = Path(file).read_text(encoding='utf-8')
+    assert f'preset:={name}' in text
+
+
+@pytest.mark.parametrize('name', PRESETS)
+def test_the_command_in_a_preset_renames_topics_that_exist(launch: Launch, name: str) -> None:
+    text = (FILE.parents[1] / 'config' / f'{name}.yaml').read_text(encoding='utf-8')
+    comments = ' '.join(line.lstrip('# ') for line in text.split('/**:')[0].splitlines())
+    arguments = dict(word.split(':=') for word in comments.split() if ':=' in word)
+    assert {'preset', 'odom', 'fix'} <= set(arguments)
+    assert len(launch(**arguments)['remappings']) == len(arguments) - 1
