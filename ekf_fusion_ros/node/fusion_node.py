@@ -35,7 +35,9 @@ from ekf_fusion_ros.node.process import make_executor
 from ekf_fusion_ros.node.publishers import Publishers
 from ekf_fusion_ros.node.reporting import Reporting
 from ekf_fusion_ros.node.services import Services
+from ekf_fusion_ros.node.transforms import make_transforms
 from ekf_fusion_ros.params.tree import Params
+from ekf_fusion_ros.roles import ODOMETRY
 from ekf_fusion_ros.session import FusionSession
 
 STALL_S = 0.25
@@ -69,6 +71,9 @@ class FusionNode(Node):  # type: ignore[misc]
         self._reporting = Reporting(
             self, self._session, self._inputs, self._switches, self._work, self._navigation,
             lambda: len(self._intake))
+        self._transforms = make_transforms(self, self._params)
+        if self._transforms is not None:
+            self._reporting.further.append(self._transforms.report)
         self._preparation: Preparation | None = None
         # Not the ROS clock: the filter runs on stamps, also while /clock stands still.
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -135,8 +140,12 @@ class FusionNode(Node):  # type: ignore[misc]
 
     def _handle(self, role: str, message: Any) -> None:
         try:
+            if role == ODOMETRY and self._transforms is not None:
+                self._transforms.note_odometry(message)
             for output in self._session.handle(role, message):
                 self._outputs.publish(output)
+                if self._transforms is not None:
+                    self._transforms.publish(output.nav)
                 self._reporting.note_output(output.time_us)
         except Exception as error:  # one bad message must not end the node
             self._guard.tell(f'a message of {role}', error)

@@ -45,6 +45,7 @@ class Reporting:
         self.output = OutputWatch(
             node.resolve_topic_name('odometry/filtered'), time.monotonic())
         self.preparing = False
+        self.further: list[Callable[[], Report]] = []
 
     def note_output(self, time_us: int) -> None:
         """Note that an estimate of this stamp was published."""
@@ -86,6 +87,7 @@ class Reporting:
         receiver = receiver_report(health.values)
         if receiver is not None and 'fix' in self._inputs.watches:
             reports.append(receiver)
+        reports += [further() for further in self.further]
         late = sum(one.refused.get(reason, 0) for one in counts.values() for reason in LATE)
         reports.append(self._work.report(
             now, self._queued(), late, health.values.get('horizon_delay', '')))

@@ -72,6 +72,11 @@ class NodeParams:
     map_frame: str = param('map', 'Name of the frame that is fixed to the earth.')
     odom_frame: str = param('odom', 'Name of the frame of the odometry.')
     base_link_frame: str = param('base_link', 'Name of the body frame of the outputs.')
+    publish_tf: bool = param(
+        False, 'Publish TF: `odom_frame` to `base_link_frame` where world_frame is the '
+        'odom_frame, else `map_frame` to `odom_frame` against the odometry.')
+    transform_time_offset: float = param(
+        0.0, 'Added to the stamps of TF.', unit='s', min=-10, max=10)
 
     @property
     def roles(self) -> tuple[str, ...]:
