@@ -29,6 +29,7 @@ from ekf_fusion_ros.node.transforms import Transforms
 from ekf_fusion_ros.node.transforms import check_frames
 from ekf_fusion_ros.params import Params
 from ekf_fusion_ros.params import with_overrides
+from ekf_fusion_ros.session import FusionSession
 
 if TYPE_CHECKING:
     from fuser_process import Fuser
@@ -90,6 +91,27 @@ def test_in_the_map_it_is_that_of_the_odometry_frame() -> None:
     np.testing.assert_allclose(product.position, (30.0, 4.0, 5.0), atol=1e-9)
     np.testing.assert_allclose(
         product.quaternion, (math.cos(0.25), 0.0, 0.0, math.sin(0.25)), atol=1e-9)
+
+
+def test_with_a_session_map_odom_base_is_the_output_at_every_stamp() -> None:
+    """The odometry goes along x with 1 m/s, so that odom -> base_link is known at any time."""
+    bench, session = Bench(), FusionSession(Params(), ('odometry', 'fix'))
+    outputs = []
+    for step in range(1, 600):
+        message = odometry(0.1 * step)
+        bench.transforms.note_odometry(message)
+        for output in session.handle('odometry', message):
+            bench.transforms.publish(output.nav)
+            outputs.append(output.nav)
+        if step % 2 == 0:
+            session.handle('fix', fix(0.1 * step))
+    assert len(bench.sent) == len(outputs) > 100
+    for nav, message in zip(outputs, bench.sent, strict=True):
+        own = Pose(np.array((1e-6 * nav.time_us - 1000.0, 0.0, 0.0)), np.array((1.0, 0, 0, 0)))
+        product = compose(pose_of(message), own)
+        np.testing.assert_allclose(product.position, swap_enu_ned(nav.position), atol=1e-9)
+        attitude = swap_attitude(nav.quaternion)
+        assert abs(product.quaternion @ attitude) == pytest.approx(1.0, abs=1e-12)
 
 
 def test_without_odometry_the_map_has_no_transform_yet() -> None:
