@@ -44,7 +44,8 @@ class NavigationStatus:
         """Say where home is, or why there is none and for how long."""
         if self.home is None:
             waits = '; '.join(shortfall.sentence(self.time_us) for shortfall in self.missing)
-            return f'home not set: {waits or "the vehicle is armed"}'
+            nothing = 'the vehicle is armed' if self.time_us else 'there is no estimate yet'
+            return f'home not set: {waits or nothing}'
         hand = ' by hand' if self.home.manual else ''
         return f'home set{hand}: {place(self.home)}'
 

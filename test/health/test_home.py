@@ -10,6 +10,7 @@ from health.stand_in import StandIn
 import pytest
 
 from ekf_fusion_ros.estimator import GeoPoint
+from ekf_fusion_ros.health.status import NavigationStatus
 from ekf_fusion_ros.params.health import HealthParams
 
 pymap3d = pytest.importorskip('pymap3d')
@@ -253,3 +254,7 @@ def test_ready_to_arm_by_the_parameter():
     strict.run(3.0)
     assert strict.status.ready
     assert ORIGIN.lat == strict.home.lat
+
+
+def test_before_the_first_judgement_home_waits_for_an_estimate():
+    assert NavigationStatus().home_text == 'home not set: there is no estimate yet'
