@@ -165,7 +165,7 @@ class Estimator(Protocol):
         """Move the origin of the local frame; False where the point is unusable."""
 
     def adopt(self, params: Any) -> None:
-        """Go on with other parameters of its kind, of which only live ones differ."""
+        """Go on with other parameters of its kind: other live ones, untried mountings."""
 
     def set_pose(self, pose: GivenPose) -> bool:
         """Jump to a pose; False before there is a state that could jump."""

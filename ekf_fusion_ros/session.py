@@ -112,7 +112,7 @@ class FusionSession:
         self._decoders = {role: decoder_of(role, self.params) for role in self._statistics}
 
     def adopt(self, params: Params) -> None:
-        """Go on with other parameters, which differ from those at the start only in live ones.
+        """Go on with other parameters, of which live ones and untried mountings may differ.
 
         As at the start the roles choose the aiding, and a value other than the default wins.
         """

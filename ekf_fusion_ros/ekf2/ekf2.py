@@ -228,12 +228,14 @@ class Ekf2:
         return self.control.move_origin(origin)
 
     def adopt(self, params: Ekf2Params) -> None:
-        """Go on with other parameters, which differ from the present ones only in live ones.
+        """Go on with other parameters.
 
-        Raises ValueError, naming the parameter, when one is out of range.
+        They may differ from the present ones in live ones, and in the mounting of sensors of which
+        nothing was fused yet. Raises ValueError, naming the parameter, when one is out of range.
         """
         validate(params)
-        self.params = self.filter.params = params
+        self.params = params
+        self.filter.adopt(params)
         self.filter.cov.set_noise(params)
 
     def set_pose(self, pose: GivenPose) -> bool:

@@ -98,11 +98,7 @@ class Filter:
 
     def __init__(self, params: Ekf2Params, history: int) -> None:
         """Start level at rest; history is the number of filter periods back to the horizon."""
-        self.params = params
-        self.gnss_lever = lever_arm(params.gnss.position, params)
-        self.vision_lever = lever_arm(params.vision.position, params)
-        self.range_lever = lever_arm(params.range.position, params)
-        self.flow_lever = lever_arm(params.flow.position, params)
+        self.adopt(params)
         self.x: Array = np.zeros(SIZE)
         self.x[0] = 1.0
         self.cov = Covariance(params)
@@ -144,6 +140,14 @@ class Filter:
         self.last_aiding_us = 0
         self.yaw_reset_requested = False
         self.north_wanted_us = 0
+
+    def adopt(self, params: Ekf2Params) -> None:
+        """Go by these parameters, and by the lever arms of their mounting, from now on."""
+        self.params = params
+        self.gnss_lever = lever_arm(params.gnss.position, params)
+        self.vision_lever = lever_arm(params.vision.position, params)
+        self.range_lever = lever_arm(params.range.position, params)
+        self.flow_lever = lever_arm(params.flow.position, params)
 
     def late(self, stamp_us: int, timeout_us: int) -> bool:
         """True when more than a timeout has passed since a stamp."""

@@ -9,6 +9,7 @@ from ekf_fusion_ros.live.steering import Steering
 from ekf_fusion_ros.params.live import changed
 from ekf_fusion_ros.params.live import differences
 from ekf_fusion_ros.params.tree import Params
+from ekf_fusion_ros.params.tree import with_overrides
 from ekf_fusion_ros.session import FusionSession
 
 SWITCH = 'node.use_'
@@ -42,6 +43,15 @@ class Tuning:
             self._session.adopt(self._params)
             words = ', '.join(f'{name} = {new} (was {old})' for name, old, new in news)
             self._session.announce(f'parameters changed on request: {words}')
+
+    def mount(self, mounting: Mapping[str, Any]) -> None:
+        """Take the mounting of sensors of which nothing was fused yet."""
+        self._params = with_overrides(self._params, mounting)
+        self._session.adopt(self._params)
+        words = ', '.join(
+            f'{name} = ({", ".join(f"{part:.4g}" for part in value)})'
+            for name, value in mounting.items())
+        self._session.announce(f'mounting by /tf_static: {words}')
 
 
 def switches(changes: Mapping[str, Any], params: Params) -> list[tuple[str, bool]]:

@@ -35,6 +35,7 @@ from ekf_fusion_ros.node.process import make_executor
 from ekf_fusion_ros.node.publishers import Publishers
 from ekf_fusion_ros.node.reporting import Reporting
 from ekf_fusion_ros.node.services import Services
+from ekf_fusion_ros.node.static_frames import make_static_frames
 from ekf_fusion_ros.node.transforms import make_transforms
 from ekf_fusion_ros.params.tree import Params
 from ekf_fusion_ros.roles import ODOMETRY
@@ -62,7 +63,9 @@ class FusionNode(Node):  # type: ignore[misc]
         self._switches = Switches(
             node.roles, self._session.inertial_role, enabled=not node.disabled_at_startup)
         steering = Steering(self._session, self._switches, node.output_frame)
-        accept_changes(self, Tuning(declared, self._session, steering), self._guard)
+        tuning = Tuning(declared, self._session, steering)
+        accept_changes(self, tuning, self._guard)
+        self._static_frames = make_static_frames(self, declared, tuning, self._guard)
         Services(self, steering, self._guard, node.roles)
         self._outputs = Publishers(self, self._params)
         self._navigation = NavigationPublisher(self, self._params)
@@ -71,7 +74,8 @@ class FusionNode(Node):  # type: ignore[misc]
         self._reporting = Reporting(
             self, self._session, self._inputs, self._switches, self._work, self._navigation,
             lambda: len(self._intake))
-        self._transforms = make_transforms(self, self._params)
+        self._transforms = make_transforms(
+            self, self._params, lambda: self._session.params.messages.odometry)
         if self._transforms is not None:
             self._reporting.further.append(self._transforms.report)
         self._preparation: Preparation | None = None
@@ -118,6 +122,8 @@ class FusionNode(Node):  # type: ignore[misc]
         return self.create_timer(period, self._guard(work), clock=self._steady)
 
     def _queue(self, role: str, message: Any) -> None:
+        if self._static_frames is not None:
+            self._static_frames.note(role, message)
         refusal = self._switches.refusal(role)
         if refusal is not None:
             self._session.refuse(role, *refusal)
@@ -132,7 +138,8 @@ class FusionNode(Node):  # type: ignore[misc]
         started = time.monotonic()
         self._work.begin(started)
         deadline = started + 1.0 / self._params.node.core_rate
-        while self._intake and time.monotonic() < deadline:
+        waits = self._static_frames is not None and self._static_frames.waits()
+        while self._intake and not waits and time.monotonic() < deadline:
             self._handle(*self._intake.take())
         self._navigation.publish(self._session.navigation)
         self._events.publish(self._session.drain_events())

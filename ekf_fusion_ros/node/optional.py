@@ -13,6 +13,7 @@ TYPES = {
     'toLL': ('robot_localization.srv', 'ToLL'),
     'fromLL': ('robot_localization.srv', 'FromLL'),
     'set_gp_origin': ('geographic_msgs.msg', 'GeoPointStamped'),
+    '/tf_static': ('tf2_msgs.msg', 'TFMessage'),
 }
 """Where the type of a service or topic is found."""
 
@@ -21,8 +22,9 @@ SUBSTITUTES = {
     'set_pose': 'publish to the topic set_pose (geometry_msgs/PoseWithCovarianceStamped)',
     'datum': 'publish to ~/set_origin (sensor_msgs/NavSatFix)',
     'set_gp_origin': 'publish to ~/set_origin (sensor_msgs/NavSatFix)',
-    'toLL': 'none',
-    'fromLL': 'none',
+    'toLL': 'nothing',
+    'fromLL': 'nothing',
+    '/tf_static': 'set messages.*.mount_xyz and mount_rpy',
 }
 """What serves instead of a type that is not there."""
 
@@ -51,5 +53,5 @@ def absence(found: Mapping[str, Any]) -> str:
     for name in missing:
         instead.setdefault(SUBSTITUTES[name], []).append(name)
     words = [f'{", ".join(names)} ({substitute})' for substitute, names in instead.items()]
-    return (f'switched off, because {" and ".join(packages)} cannot be imported; in brackets what '
+    return (f'switched off, because {", ".join(packages)} cannot be imported; in brackets what '
             f'serves instead: {"; ".join(words)}')

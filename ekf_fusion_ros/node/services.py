@@ -77,7 +77,8 @@ class Services:
             'toggle': self._toggle, 'datum': self._set_datum, 'toLL': self._to_ll,
             'fromLL': self._from_ll,
             'set_pose': lambda request, _: self._steering.set_pose(request.pose)}
-        self._serve(kind, name, works[name])
+        if name in works:
+            self._serve(kind, name, works[name])
 
     def _switch(self, role: str, on: bool) -> str:
         """Switch an input through its parameter, so that both tell the same."""

@@ -32,16 +32,16 @@ DEPTH = 100
 class Transforms:
     """Publishes one transform for each output, unless another node publishes it.
 
-    `send` publishes a list of TransformStamped.
+    `odometry` gives the mounting of the odometry sensor, `send` publishes TransformStamped.
     """
 
     def __init__(
-        self, params: Params, send: Callable[[list[TransformStamped]], None],
-        warn: Callable[[str], None],
+        self, params: Params, odometry: Callable[[], OdometryMessageParams],
+        send: Callable[[list[TransformStamped]], None], warn: Callable[[str], None],
     ) -> None:
         node = params.node
         self._node = node
-        self._odometry: OdometryMessageParams = params.messages.odometry
+        self._odometry = odometry
         self._send = send
         self._warn = warn
         self._offset_us = round(1e6 * node.transform_time_offset)
@@ -57,7 +57,7 @@ class Transforms:
         if not self._in_map:
             return
         try:
-            pose = odometry_pose(message, self._node.odom_frame, self._odometry)
+            pose = odometry_pose(message, self._node.odom_frame, self._odometry())
         except Refused as refusal:
             if refusal.reason == 'wrong_frame' and refusal.detail != self._watch.trouble:
                 self._watch.trouble = refusal.detail
@@ -96,7 +96,9 @@ class Transforms:
         return self._watch.report(time.monotonic())
 
 
-def make_transforms(node: Node, params: Params) -> Transforms | None:
+def make_transforms(
+    node: Node, params: Params, odometry: Callable[[], OdometryMessageParams],
+) -> Transforms | None:
     """Return what publishes TF, None where that is not wanted.
 
     Raises ValueError, in one sentence, where it is wanted and cannot be.
@@ -110,7 +112,7 @@ def make_transforms(node: Node, params: Params) -> Transforms | None:
                          'ros-jazzy-tf2-msgs, or set it to false')
     publisher = node.create_publisher(kind, TOPIC, QoSProfile(depth=DEPTH))
     transforms = Transforms(
-        params, lambda messages: publisher.publish(kind(transforms=messages)),
+        params, odometry, lambda messages: publisher.publish(kind(transforms=messages)),
         lambda text: node.get_logger().warning(text))
     node.create_subscription(kind, TOPIC, transforms.hear, QoSProfile(depth=DEPTH))
     return transforms

@@ -72,6 +72,9 @@ class NodeParams:
     map_frame: str = param('map', 'Name of the frame that is fixed to the earth.')
     odom_frame: str = param('odom', 'Name of the frame of the odometry.')
     base_link_frame: str = param('base_link', 'Name of the body frame of the outputs.')
+    mounting_from_tf: bool = param(
+        True, 'Take the mounting of a sensor from /tf_static (`base_link_frame` to the frame of '
+        'its messages) where the parameters leave it at zero; needs tf2_msgs.')
     publish_tf: bool = param(
         False, 'Publish TF: `odom_frame` to `base_link_frame` where world_frame is the '
         'odom_frame, else `map_frame` to `odom_frame` against the odometry.')

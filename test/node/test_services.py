@@ -352,7 +352,7 @@ def test_nothing_leaves_a_callback(full: Any) -> None:
 
 def test_absent_types_are_named_with_what_serves_instead() -> None:
     line = absence({})
-    assert 'geographic_msgs and robot_localization cannot be imported' in line
+    assert 'geographic_msgs, robot_localization, tf2_msgs cannot be imported' in line
     for name in TYPES:
         assert name in line
     assert 'toggle (call ~/set_enabled (std_srvs/SetBool))' in line

@@ -46,8 +46,9 @@ class Bench:
         self.sent: list[TransformStamped] = []
         self.warned: list[str] = []
         changes = {f'node.{name}': value for name, value in values.items()}
+        params = with_overrides(Params(), changes)
         self.transforms = Transforms(
-            with_overrides(Params(), changes), self.sent.extend, self.warned.append)
+            params, lambda: params.messages.odometry, self.sent.extend, self.warned.append)
 
 
 def state(time_us: int, position: tuple[float, ...], yaw: float) -> NavState:
