@@ -17,6 +17,9 @@ from ekf_fusion_ros.samples import Sample
 
 Array = NDArray[np.float64]
 
+YAW_KNOWN_VARIANCE = math.radians(30.0) ** 2
+"""Variance of a given yaw below which it aligns the filter."""
+
 
 @dataclass(frozen=True, slots=True)
 class GeoPoint:

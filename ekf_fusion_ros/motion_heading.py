@@ -132,6 +132,13 @@ class MotionHeading:
         """Note the heading of the odometry frame that the filter holds, rad as in HeadingFit."""
         self._held = (yaw, sigma)
 
+    def given(self, sigma: float) -> None:
+        """Note that the heading in use was given from outside with a sigma in rad.
+
+        It stays until motion knows it better or contradicts it.
+        """
+        self._announced = min(self._announced, sigma)
+
     def push_fix(self, sample: GnssSample) -> HeadingSample | None:
         """Take a fix; return a heading when there is one to announce."""
         if self._projection is None:

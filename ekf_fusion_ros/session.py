@@ -14,6 +14,7 @@ from typing import Any
 
 from ekf_fusion_ros.airspeed_conditions import check_airspeed
 from ekf_fusion_ros.completion import Completion
+from ekf_fusion_ros.estimator import YAW_KNOWN_VARIANCE
 from ekf_fusion_ros.estimator import Estimator
 from ekf_fusion_ros.estimator import Event
 from ekf_fusion_ros.estimator import GeoPoint
@@ -442,7 +443,11 @@ class FusionSession:
         nav = self._estimator.nav_state()
         if nav is None or not (self._local or self._at_home(nav)):
             return False
-        return self._estimator.set_pose(pose)
+        if not self._estimator.set_pose(pose):
+            return False
+        if self._motion is not None and 0.0 < pose.yaw_var < YAW_KNOWN_VARIANCE:
+            self._motion.given(math.sqrt(pose.yaw_var))
+        return True
 
     @property
     def navigation(self) -> NavigationStatus:

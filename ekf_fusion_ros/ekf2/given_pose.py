@@ -14,15 +14,13 @@ from ekf_fusion_ros.ekf2.resets import Resets
 from ekf_fusion_ros.ekf2.state import PD
 from ekf_fusion_ros.ekf2.state import PN
 from ekf_fusion_ros.ekf2.state import VN
+from ekf_fusion_ros.estimator import YAW_KNOWN_VARIANCE
 from ekf_fusion_ros.estimator import GivenPose
 from ekf_fusion_ros.mathlib.angles import wrap_pi
 from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
 from ekf_fusion_ros.mathlib.rotation import yaw_of
 
 Array = NDArray[np.float64]
-
-YAW_KNOWN_VARIANCE = math.radians(30.0) ** 2
-"""Variance of a given yaw below which it aligns the filter."""
 
 
 def take_pose(f: Filter, resets: Resets, pose: GivenPose) -> None:

@@ -102,6 +102,37 @@ def test_without_a_fix_the_local_frame_takes_a_pose(build, estimator):
     assert session.set_pose(POSE)
 
 
+def drive_two_topics(session, build, first, last, speed):
+    """Drive east over [first, last] in s at a speed in m/s; the odometry's x axis is east."""
+    outputs = []
+    for step in range(round(10 * first), round(10 * last)):
+        x = speed * (0.1 * step - first)
+        message = build.odometry(START + 0.1 * step, x)
+        message.twist.twist.linear.x = speed
+        outputs += session.handle('odometry', message)
+        if step % 2 == 0:
+            fix = build.fix(START + 0.1 * step)
+            fix.longitude += x / 76056.0
+            outputs += session.handle('fix', fix)
+    return outputs
+
+
+@pytest.mark.parametrize(('yaw', 'sigma', 'stays'), [
+    (0.1, 0.05, True), (0.1, 1.0, False), (1.5, 0.05, False)])
+def test_a_given_heading_stays_until_motion_knows_better(build, yaw, sigma, stays):
+    """The vehicle looks east, NED yaw 90 deg; it is told to look `yaw` rad farther right."""
+    session = session_of(None, ('odometry', 'fix'))
+    drive_two_topics(session, build, 0.0, 20.0, 0.0)
+    given = GivenPose(np.zeros(3), np.zeros(3), 0.5 * np.pi + yaw, sigma ** 2)
+    assert session.set_pose(given)
+    told = texts(session)
+    assert 'pose set on request' in told
+    assert not any('yaw aligned by matching' in text for text in told)
+    outputs = drive_two_topics(session, build, 20.0, 40.0, 1.0)
+    assert outputs
+    assert any('yaw aligned by matching' in text for text in texts(session)) is not stays
+
+
 def test_adopted_parameters_reach_decoders_and_estimator(build, estimator):
     session = session_of(estimator)
     drive(session, build, START, START + 1)
