@@ -27,6 +27,7 @@ from ekf_fusion_ros.fused_output import FusedOutput
 from ekf_fusion_ros.inputs import ROLE_OF_SAMPLE
 from ekf_fusion_ros.params import Params
 from ekf_fusion_ros.replay.decoding import BatchDecoder
+from ekf_fusion_ros.replay.fix_distance import FixDistance
 from ekf_fusion_ros.replay.options import ReplayOptions
 from ekf_fusion_ros.replay.sinks import AlignmentSink
 from ekf_fusion_ros.replay.sinks import BagSink
@@ -62,6 +63,7 @@ class Progress:
     end_us: int = 0
     first_output_us: int | None = None
     rows: int = 0
+    fix_distance: dict[str, Any] | None = None
     events: list[Event] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     kernel_seconds: float = 0.0
@@ -157,6 +159,7 @@ class _Run:
         self._bag = BagSink(options.output, options.params, local=self.session.local) \
             if options.write_bag else None
         self._rows: list[FusedOutput] = []
+        self._fix_distance = FixDistance(self.session.params)
         self.withholding = Withholding(options.withhold, progress.start_us)
 
     def drive(self, steps: Iterable[list[FusedOutput]]) -> None:
@@ -173,6 +176,7 @@ class _Run:
             self.session.finish()
             self.progress.events = self.session.drain_events()
         self.progress.rows = self._track.rows
+        self.progress.fix_distance = self._fix_distance.as_dict()
         self.progress.cpu_seconds = time.process_time() - cpu
         self.progress.wall_seconds = time.perf_counter() - wall
 
@@ -188,6 +192,7 @@ class _Run:
         """Write the rows that have gathered."""
         rows, self._rows = self._rows, []
         self._track.write([output.nav for output in rows])
+        self._fix_distance.note(rows)
         if self._bag is not None and rows:
             self._bag.write(rows)
 

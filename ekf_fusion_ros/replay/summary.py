@@ -58,6 +58,7 @@ def _content(
         'alignment': {name: time_us / SECOND_US for name, time_us in session.milestones.items()},
         'first_output': _seconds(progress.first_output_us),
         'rows': progress.rows,
+        'fix_distance': progress.fix_distance,
         'notes': progress.notes,
         'cpu_seconds': progress.cpu_seconds,
         'kernel_loading_cpu_seconds': progress.kernel_seconds,
@@ -144,6 +145,11 @@ def _gist(summary: dict[str, Any]) -> list[str]:
         after = summary['first_output'] - summary['start']
         lines.append(f'{summary["rows"]} rows in frame {summary["frame"]}, the first '
                      f'{after:.1f} s after the start')
+    distance = summary['fix_distance']
+    if distance is not None:
+        lines.append(f'used fixes: track passes by {distance["rms"]:.2f} m RMS, at most '
+                     f'{distance["largest"]:.2f} m, {distance["over_limit"]} of '
+                     f'{distance["count"]} beyond 3 sigma + 2 m')
     for name, topic in summary['topics'].items():
         reasons = ', '.join(f'{n} {reason}' for reason, n in topic['refused'].items())
         passed_over = ', '.join(f'{n} {reason}' for reason, n in topic['passed_over'].items())

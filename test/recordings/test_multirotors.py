@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from recordings.scores import attitude_errors
@@ -31,6 +33,9 @@ def test_the_track_stays_with_the_fixes(flight):
     _, distance, limit = horizontal_errors(recording, output, 0.11, assumed_sigma=2.5)
     assert (distance < limit).all()
     assert rms(distance) < 1.0
+    told = json.loads((output / 'summary.json').read_text(encoding='utf-8'))['fix_distance']
+    assert told['rms'] == pytest.approx(rms(distance), rel=0.01)
+    assert told['largest'] == pytest.approx(distance.max(), rel=0.01)
 
 
 @pytest.mark.slow
