@@ -15,6 +15,7 @@ from ekf_fusion_ros.params.ekf2 import HEIGHT_REFERENCES
 from ekf_fusion_ros.params.ekf2 import MAG_TYPES
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 from ekf_fusion_ros.params.health import HealthParams
+from ekf_fusion_ros.params.lpe import LpeParams
 from ekf_fusion_ros.params.messages import MessageParams
 from ekf_fusion_ros.params.spec import leaves
 
@@ -42,7 +43,12 @@ EV_CONTROL_BITS = (
     'ekf2.vision.use_position', 'vision height beside the height reference',
     'ekf2.vision.use_velocity', 'ekf2.vision.use_yaw',
 )
+LPE_BITS = (
+    'lpe.gnss.enabled', 'lpe.flow.enabled', 'lpe.vision.enabled', 'lpe.landing_target.enabled',
+    'lpe.land.enabled', 'lpe.agl_as_height', 'lpe.flow.gyro_compensation', 'lpe.baro.enabled',
+)
 
+OURS = ('ekf2.', 'lpe.')
 BIT_MASKS = {
     'fusion_mode': AID_BITS,
     'EKF2_AID_MASK': AID_BITS,
@@ -55,6 +61,7 @@ BIT_MASKS = {
     'EKF2_TERR_MASK': TERRAIN_BITS,
     'EKF2_EV_CTRL': EV_CONTROL_BITS,
     'EKF2_GPS_CTRL': GPS_CONTROL_BITS,
+    'LPE_FUSION': LPE_BITS,
 }
 ENUMERATIONS = {
     'vdist_sensor_type': ('ekf2.height.reference', HEIGHT_REFERENCES),
@@ -143,7 +150,8 @@ def translate(foreign: Mapping[str, Any], base: Ekf2Params) -> tuple[dict[str, A
 
 def _plain_names(base: Ekf2Params) -> dict[str, str]:
     names = SECONDS | MILLISECONDS
-    for tree, prefix in ((base, 'ekf2.'), (MessageParams(), 'messages.'), (HEALTH, 'health.')):
+    for tree, prefix in ((base, 'ekf2.'), (LpeParams(), 'lpe.'), (MessageParams(), 'messages.'),
+                         (HEALTH, 'health.')):
         for name, _, spec in leaves(tree, prefix):
             names.update({foreign: name for foreign in (spec.px4, spec.ecl) if foreign})
     return names
@@ -164,7 +172,7 @@ def _expand_mask(
     for index in range(max(len(bits), mask.bit_length())):
         is_set = bool(mask >> index & 1)
         target = bits[index] if index < len(bits) else 'not a bit that is known'
-        if target.startswith('ekf2.'):
+        if target.startswith(OURS):
             values[target] = is_set
         elif is_set:
             unused.append(f'{name} bit {index} ({target})')
@@ -203,11 +211,11 @@ def _whole(name: str, value: Any) -> int:
 
 def concerns_filter(name: str) -> bool:
     """Return whether a PX4 parameter is one that `translate` knows about."""
-    return name.startswith('EKF2_') or name in CONCERNING
+    return name.startswith(('EKF2_', 'LPE_', 'ATT_')) or name in CONCERNING
 
 
 def read_px4(path: Path) -> tuple[dict[str, float], list[str]]:
-    """Return EKF2 parameters and MAV_TYPE of a PX4 .params file and what else it holds, in words.
+    """Return the parameters of a PX4 .params file that `translate` knows, and the rest in words.
 
     Lines are `vehicle component NAME value type`, `#` starts a comment. Raises ValueError naming
     file and line.

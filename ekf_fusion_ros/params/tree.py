@@ -15,6 +15,7 @@ from typing import get_type_hints
 
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 from ekf_fusion_ros.params.health import HealthParams
+from ekf_fusion_ros.params.lpe import LpeParams
 from ekf_fusion_ros.params.messages import MessageParams
 from ekf_fusion_ros.params.node import NodeParams
 from ekf_fusion_ros.params.session import SessionParams
@@ -33,6 +34,7 @@ class Params:
 
     estimator: str = param('ekf2', 'Which estimator runs.', choices=('ekf2',))
     ekf2: Ekf2Params = field(default_factory=Ekf2Params)
+    lpe: LpeParams = field(default_factory=LpeParams)
     messages: MessageParams = field(default_factory=MessageParams)
     session: SessionParams = field(default_factory=SessionParams)
     health: HealthParams = field(default_factory=HealthParams)
