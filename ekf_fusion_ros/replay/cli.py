@@ -16,6 +16,7 @@ from ekf_fusion_ros.params import load_file
 from ekf_fusion_ros.params import with_overrides
 from ekf_fusion_ros.replay.options import ReplayOptions
 from ekf_fusion_ros.replay.runner import replay
+from ekf_fusion_ros.replay.side_by_side import replay_side_by_side
 from ekf_fusion_ros.replay.storage import RecordingError
 from ekf_fusion_ros.roles import SUPPORTED
 
@@ -35,7 +36,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as stop:
         return WRONG_ARGUMENTS if stop.code else DONE
     try:
-        replay(_options(arguments))
+        _run(_options(arguments), arguments.estimator)
     except RecordingError as error:
         return _fail(str(error), UNUSABLE)
     except ValueError as error:
@@ -43,6 +44,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     except OSError as error:
         return _fail(f'{error.filename or arguments.output}: {error.strerror}', UNUSABLE)
     return DONE
+
+
+def _run(options: ReplayOptions, estimators: str | None) -> None:
+    """Replay once, or once with each of several estimators."""
+    names = [name.strip() for name in (estimators or options.params.estimator).split(',')]
+    if len(set(names)) < len(names):
+        raise ValueError(f'--estimator {estimators}: each name once')
+    if len(names) > 1:
+        replay_side_by_side(options, names)
+    else:
+        replay(replace(options, params=with_overrides(options.params, {'estimator': names[0]})))
 
 
 def _fail(sentence: str, status: int) -> int:
@@ -70,6 +82,9 @@ def _parser() -> argparse.ArgumentParser:
     add('--withhold', action='append', default=[], metavar='ROLE=S:E[,S:E...]',
         help='keep messages of a role from the filter in windows of stamps, in seconds after '
         'the start; fix withholds fix_velocity and gps_heading too')
+    add('--estimator', metavar='NAME[,NAME...]',
+        help='estimator in place of the parameter; several run one after the other, each into a '
+        'folder of its name, and are compared')
     add('--rate', type=float, metavar='HZ', help='rate of the outputs; 0 = every filter update')
     add('--log-states', action='store_true', help='write estimator.csv, a row a filter update')
     add('--no-bag', action='store_true', help='do not write the fused bag')
