@@ -34,7 +34,8 @@ class ImuSample:
 
     delta_angle (3,) rad, coning-corrected where the source can; delta_velocity (3,) m/s,
     specific force times interval (at rest about -9.81 dt on z); intervals in s; `clipping` marks
-    accelerometer axes that hit their range.
+    accelerometer axes that hit their range. orientation (4,) w, x, y, z body to NED at the end,
+    None where the source has none.
     """
 
     time_us: int
@@ -43,6 +44,7 @@ class ImuSample:
     delta_angle_dt: float
     delta_velocity_dt: float
     clipping: tuple[bool, bool, bool] = (False, False, False)
+    orientation: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,13 +131,18 @@ class VisionSample:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RangeSample:
-    """Slant distance in m along the sensor axis; quality 0..100, -1 = not known."""
+    """Slant distance in m along the sensor axis; quality 0..100, -1 = not known.
+
+    variance m^2, 0 = not known; `ultrasound` tells a sonar from a lidar.
+    """
 
     time_us: int
     distance: float
     quality: int = -1
     min_distance: float = 0.2
     max_distance: float = 20.0
+    variance: float = 0.0
+    ultrasound: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,7 +17,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / 'ekf_fusion_ros'
 LAYERS = (
     ('kernels.compile',),
     ('mathlib', 'geo', 'frames'),
-    ('params', 'samples', 'buffer', 'estimator'),
+    ('params', 'samples', 'buffer', 'estimator', 'observation'),
     ('kernels',),
     ('ekf2', 'lpe', 'health', 'odometry_imu', 'motion_heading'),
     ('messages',),

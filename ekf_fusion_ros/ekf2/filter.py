@@ -18,10 +18,10 @@ from ekf_fusion_ros.ekf2.flags import ControlFlags
 from ekf_fusion_ros.ekf2.flags import FaultFlags
 from ekf_fusion_ros.ekf2.flags import FusionTimes
 from ekf_fusion_ros.ekf2.flags import Rejections
-from ekf_fusion_ros.ekf2.observation import Observation
 from ekf_fusion_ros.ekf2.output_predictor import OutputPredictor
 from ekf_fusion_ros.ekf2.state import FILTER_PERIOD
 from ekf_fusion_ros.ekf2.state import SIZE
+from ekf_fusion_ros.observation import Observation
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 from ekf_fusion_ros.samples import AirspeedSample
 from ekf_fusion_ros.samples import VisionSample

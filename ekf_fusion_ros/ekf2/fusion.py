@@ -7,11 +7,11 @@ import math
 
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.filter import VerticalCheck
-from ekf_fusion_ros.ekf2.observation import Observation
 from ekf_fusion_ros.ekf2.state import PD
 from ekf_fusion_ros.ekf2.state import PN
 from ekf_fusion_ros.ekf2.state import VD
 from ekf_fusion_ros.ekf2.state import VN
+from ekf_fusion_ros.observation import Observation
 
 
 def fuse_horizontal_velocity(

@@ -13,11 +13,11 @@ from ekf_fusion_ros.ekf2.events import EventKind
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.fusion import fuse_vertical_position
 from ekf_fusion_ros.ekf2.gnss_checks import GnssChecks
-from ekf_fusion_ros.ekf2.observation import Observation
 from ekf_fusion_ros.ekf2.range_height import RangeHeight
 from ekf_fusion_ros.ekf2.resets import UNKNOWN_CLIMB_VARIANCE
 from ekf_fusion_ros.ekf2.resets import Resets
 from ekf_fusion_ros.ekf2.state import SECOND
+from ekf_fusion_ros.observation import Observation
 
 TIMEOUT_US = 5 * SECOND
 BAD_ACCEL_RESET_US = SECOND // 2

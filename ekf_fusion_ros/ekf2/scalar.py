@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.filter import Filter
-from ekf_fusion_ros.ekf2.observation import Observation
 from ekf_fusion_ros.kernels.update import test_ratio
+from ekf_fusion_ros.observation import Observation
 
 Array = NDArray[np.float64]
 

@@ -173,8 +173,10 @@ class ImuIntegrator:
         for k in range(1, count + 1):
             time_us = before.time_us + step_us * k // count
             between = [a + (b - a) * k / count for a, b in zip(old, new, strict=True)]
+            orientation = reading.orientation if k == count else None
             samples.append(
-                _increments(ImuReading(time_us, between[0:3], between[3:6]), time_us - last_us))
+                _increments(ImuReading(time_us, between[0:3], between[3:6], orientation),
+                            time_us - last_us))
             last_us = time_us
         return samples
 
@@ -193,7 +195,7 @@ def _increments(reading: ImuReading, step_us: int) -> ImuSample:
     x, y, z = reading.specific_force
     return ImuSample(
         reading.time_us, np.array((p * dt, q * dt, r * dt)), np.array((x * dt, y * dt, z * dt)),
-        dt, dt)
+        dt, dt, orientation=reading.orientation)
 
 
 def _check_present(numbers: Sequence[float], first: int, name: str) -> None:

@@ -17,8 +17,9 @@ from ekf_fusion_ros.samples import RangeSample
 
 NO_DISTANCE = 0
 UNKNOWN_QUALITY = -1
+ULTRASOUND = 0
 # Places in the flat message; the variance is younger than ROS 2 Humble.
-LIMITS, DISTANCE, VARIANCE = slice(2, 4), 4, 5
+KIND, LIMITS, DISTANCE, VARIANCE = 0, slice(2, 4), 4, 5
 
 
 def decode_range(message: Any, params: MessageParams) -> RangeSample:
@@ -27,19 +28,22 @@ def decode_range(message: Any, params: MessageParams) -> RangeSample:
     By REP-117 -inf is an object too close and +inf none within reach: the sensor works but has
     no distance, so the sample stands at that limit with quality 0. NaN is a reading gone wrong.
     A finite distance beyond the limits is left to the estimator, which knows the limits too.
-    Ultrasound and infrared (`radiation_type`) count alike. Raises Refused.
+    Ultrasound is marked (`radiation_type`), infrared and laser are not. Raises Refused.
     """
     flat = message if isinstance(message, FlatMessage) else _flat(message)
     time_us = checked_stamp(flat.sec, flat.nanosec)
     low, high = _limits(flat.numbers[LIMITS], params.range)
     fields.check_variances((*flat.numbers[VARIANCE:], 0.0), (0,), 'variance')
     distance = float(flat.numbers[DISTANCE])
+    variance = float((*flat.numbers[VARIANCE:], 0.0)[0])
+    ultrasound = int(flat.numbers[KIND]) == ULTRASOUND
     if math.isinf(distance):
-        return RangeSample(time_us, high if distance > 0.0 else low, NO_DISTANCE, low, high)
+        return RangeSample(time_us, high if distance > 0.0 else low, NO_DISTANCE, low, high,
+                           variance, ultrasound)
     fields.check_finite((distance,), 'range')
     if distance < 0.0:
         raise Refused('negative_range', f'range is {distance:g} m: too close is -inf by REP-117')
-    return RangeSample(time_us, distance, UNKNOWN_QUALITY, low, high)
+    return RangeSample(time_us, distance, UNKNOWN_QUALITY, low, high, variance, ultrasound)
 
 
 def _limits(told: Sequence[float], params: RangeMessageParams) -> tuple[float, float]:

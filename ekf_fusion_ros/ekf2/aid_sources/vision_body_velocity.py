@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.filter import Filter
-from ekf_fusion_ros.ekf2.observation import Observation
 from ekf_fusion_ros.kernels.vision import Three
 from ekf_fusion_ros.kernels.vision import turn_velocity
 from ekf_fusion_ros.mathlib.rotation import cross
 from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
+from ekf_fusion_ros.observation import Observation
 from ekf_fusion_ros.samples import VelocityFrame
 from ekf_fusion_ros.samples import VisionSample
 
