@@ -42,6 +42,13 @@ def test_orientation_is_optional(build):
     assert decode_imu(message, PARAMS).orientation is None
 
 
+def test_increments_carry_the_orientation_at_their_end(build):
+    integrator, tilted = ImuIntegrator(PARAMS), np.array((0.8, 0.6, 0.0, 0.0))
+    integrator.push(ImuReading(1_000_000, (0.0,) * 3, (0.0,) * 3, np.array((1.0, 0, 0, 0))))
+    sample, = integrator.push(ImuReading(1_010_000, (0.0,) * 3, (0.0,) * 3, tilted))
+    assert sample.orientation is tilted
+
+
 def test_mounting_turns_vectors_and_orientation_like_scipy(build):
     rotation = pytest.importorskip('scipy.spatial.transform').Rotation
     rpy = (0.3, -0.2, 1.1)

@@ -46,6 +46,14 @@ def test_bad_range(build, field, value, reason):
     assert refused.value.reason == reason
 
 
+@pytest.mark.parametrize(('radiation_type', 'ultrasound'), [(0, True), (1, False)])
+def test_sonar_is_told_from_lidar_and_the_variance_passed_on(build, radiation_type, ultrasound):
+    message = build.range()
+    message.radiation_type, message.variance = radiation_type, 0.04
+    sample = decode_range(message, PARAMS)
+    assert (sample.ultrasound, sample.variance) == (ultrasound, pytest.approx(0.04))
+
+
 def test_message_of_humble_has_no_variance(build):
     message = build.range()
     del message.variance
