@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from dataclasses import field
 from enum import Enum
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,13 +48,25 @@ class ImuSample:
     orientation: Array | None = None
 
 
+class Antenna(NamedTuple):
+    """Place of the antenna in the body, (3,) m FRD, for each kind of measurement of a fix.
+
+    They differ where a fix is a mean of several receivers, each kind with weights of its own.
+    """
+
+    position: Array
+    height: Array
+    velocity: Array
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class GnssSample:
     """A GNSS fix.
 
     lat, lon deg; alt m in the datum of the source; velocity (3,) m/s NED; eph, epv 1-sigma m;
     sacc 1-sigma m/s; fix_type 3 = 3-D; nsats, pdop None where the source has none;
-    yaw rad of the vehicle from two antennas, the angle of their axis in the body, and 1-sigma rad.
+    yaw rad of the vehicle from two antennas, the angle of their axis in the body, and 1-sigma rad;
+    antenna None where it is the one that the parameters place.
     """
 
     time_us: int
@@ -70,6 +83,7 @@ class GnssSample:
     yaw: float = math.nan
     yaw_offset: float = 0.0
     yaw_accuracy: float = math.nan
+    antenna: Antenna | None = None
 
     @property
     def has_velocity(self) -> bool:

@@ -24,6 +24,7 @@ from ekf_fusion_ros.ekf2.state import SIZE
 from ekf_fusion_ros.observation import Observation
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 from ekf_fusion_ros.samples import AirspeedSample
+from ekf_fusion_ros.samples import Antenna
 from ekf_fusion_ros.samples import VisionSample
 
 Array = NDArray[np.float64]
@@ -33,7 +34,10 @@ MIN_PERIOD = 2.5e-3
 """Interval in s below which an increment says nothing about a rate."""
 
 class GnssFix(NamedTuple):
-    """A fix in the local frame: NE position (2,) m, altitude m, NED velocity (3,) m/s."""
+    """A fix in the local frame: NE position (2,) m, altitude m, NED velocity (3,) m/s.
+
+    antenna: lever arms (3,) from the IMU, None where they are those of the parameters.
+    """
 
     time_us: int
     position: Array
@@ -47,6 +51,7 @@ class GnssFix(NamedTuple):
     lon: float
     yaw: float = math.nan
     yaw_offset: float = 0.0
+    antenna: Antenna | None = None
 
 
 class VerticalCheck(NamedTuple):

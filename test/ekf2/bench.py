@@ -14,6 +14,7 @@ from ekf_fusion_ros.mathlib.rotation import quat_from_matrix
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 from ekf_fusion_ros.samples import NAN3
 from ekf_fusion_ros.samples import AirspeedSample
+from ekf_fusion_ros.samples import Antenna
 from ekf_fusion_ros.samples import AuxVelocitySample
 from ekf_fusion_ros.samples import BaroSample
 from ekf_fusion_ros.samples import FlowSample
@@ -50,6 +51,7 @@ class Fix:
     sacc: float = 0.2
     yaw: float = math.nan
     yaw_offset: float = 0.0
+    antenna: Antenna | None = None
 
 
 @dataclass
@@ -138,7 +140,7 @@ class Bench:
             fix = self.fix
             return GnssSample(self.now_us, fix.lat, fix.lon, fix.alt, fix.eph, fix.epv,
                               fix.velocity.copy(), fix.sacc, nsats=fix.nsats, pdop=fix.pdop,
-                              yaw=fix.yaw, yaw_offset=fix.yaw_offset)
+                              yaw=fix.yaw, yaw_offset=fix.yaw_offset, antenna=fix.antenna)
         if sensor == 'range':
             return RangeSample(self.now_us, self.distance, self.distance_quality)
         if sensor == 'flow':

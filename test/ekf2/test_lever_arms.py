@@ -15,6 +15,7 @@ from ekf_fusion_ros.params.ekf2 import HeightParams
 from ekf_fusion_ros.params.ekf2 import ImuParams
 from ekf_fusion_ros.params.ekf2 import MagParams
 from ekf_fusion_ros.params.ekf2 import VisionParams
+from ekf_fusion_ros.samples import Antenna
 from ekf_fusion_ros.samples import VelocityFrame
 
 EAST = 0.5 * math.pi
@@ -31,6 +32,23 @@ def test_the_place_of_the_antenna_is_taken_off():
     bench.run(25.0)
     assert {'gps', 'gps_hgt'} <= bench.flags
     np.testing.assert_allclose(bench.x[7:9], (0.5, -1.0), atol=0.05)
+
+
+def test_a_fix_may_place_its_antenna_itself():
+    """Position, height and velocity of a fix of several receivers each have a place."""
+    bench = Bench(Ekf2Params(
+        gnss=GnssParams(position=(9.0, 9.0, 9.0)), imu=ImuParams(position=(0.1, 0.0, 0.0)),
+        mag=MagParams(declination_from_table=False), height=HeightParams(reference='gnss')),
+        yaw=EAST)
+    bench.fix.antenna = Antenna(
+        np.array((1.1, 0.5, -7.0)), np.array((5.0, 5.0, -0.2)), np.zeros(3))
+    bench.run(4.0)
+    bench.sending.add('fix')
+    bench.run(25.0)
+    assert {'gps', 'gps_hgt'} <= bench.flags
+    np.testing.assert_allclose(bench.x[7:9], (0.5, -1.0), atol=0.05)
+    # The origin is at the height of the fix, from where the IMU is 0.2 m down.
+    assert bench.x[9] == pytest.approx(0.2, abs=0.05)
 
 
 def test_the_place_of_the_odometry_sensor_is_taken_off():

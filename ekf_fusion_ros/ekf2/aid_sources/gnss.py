@@ -26,6 +26,7 @@ from ekf_fusion_ros.ekf2.yaw_recovery import YawRecovery
 from ekf_fusion_ros.estimator import GeoPoint
 from ekf_fusion_ros.kernels.update import test_ratio
 from ekf_fusion_ros.mathlib.rotation import cross
+from ekf_fusion_ros.samples import Antenna
 from ekf_fusion_ros.samples import GnssSample
 
 Array = NDArray[np.float64]
@@ -96,9 +97,15 @@ class Gnss:
         delay_us = round(f.params.gnss.delay_ms * 1000) + FILTER_PERIOD_US // 2
         fix = GnssFix(sample.time_us - delay_us, np.zeros(2), sample.alt, sample.velocity,
                       sample.eph, sample.epv, sample.sacc, sample.has_velocity, sample.lat,
-                      sample.lon, sample.yaw, sample.yaw_offset)
+                      sample.lon, sample.yaw, sample.yaw_offset, self._levers(sample.antenna))
         self.buffer.push(fix.time_us, self._placed(fix))
         return origin_set
+
+    def _levers(self, antenna: Antenna | None) -> Antenna | None:
+        """Return the lever arms of an antenna that the sample places itself."""
+        if antenna is None:
+            return None
+        return Antenna(*(place - self._f.params.imu.position for place in antenna))
 
     def _placed(self, fix: GnssFix) -> GnssFix:
         """Return a fix with its position in the local frame, which is zero without an origin."""
@@ -288,14 +295,17 @@ class Gnss:
         f = self._f
         assert f.fix is not None
         sacc = max(f.fix.sacc, f.params.gnss.vel_noise)
-        lever = f.gnss_lever
-        if lever is None:
+        lever, levers = f.gnss_lever, f.fix.antenna
+        if levers is None and lever is None:
             f.fix = f.fix._replace(sacc=sacc)
             return
-        arm = f.rot @ lever
+        if levers is None:
+            assert lever is not None
+            levers = Antenna(lever, lever, lever)
+        arm, height_arm = f.rot @ levers.position, f.rot @ levers.height
         f.fix = f.fix._replace(
-            position=f.fix.position - arm[0:2], altitude=f.fix.altitude + float(arm[2]),
-            velocity=f.fix.velocity - f.rot @ cross(f.rate, lever), sacc=sacc)
+            position=f.fix.position - arm[0:2], altitude=f.fix.altitude + float(height_arm[2]),
+            velocity=f.fix.velocity - f.rot @ cross(f.rate, levers.velocity), sacc=sacc)
 
     def _fuse(self) -> None:
         f = self._f
