@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
-
 from ekf_fusion_ros.estimator import HealthLevel
 from ekf_fusion_ros.live.report import Report
 
@@ -23,7 +21,7 @@ class TransformWatch:
     def __init__(self, parent: str, child: str) -> None:
         self._parent = parent
         self._child = child
-        self._own: deque[Key] = deque(maxlen=OWN_KEPT)
+        self._own: dict[Key, None] = {}
         self._foreign: tuple[float, str] | None = None
         self._told = False
         self.count = 0
@@ -31,12 +29,14 @@ class TransformWatch:
 
     def note_own(self, key: Key) -> None:
         """Note what is published now: stamp in ns and translation in m."""
-        self._own.append(key)
+        self._own[key] = None
+        if len(self._own) > OWN_KEPT:
+            del self._own[next(iter(self._own))]
         self.count += 1
 
-    def hear(self, parent: str, child: str, key: Key, now: float) -> None:
-        """Take a transform from the topic."""
-        if child.lstrip('/') == self._child and key not in self._own:
+    def hear(self, parent: str, key: Key, now: float) -> None:
+        """Take a transform to the child from the topic."""
+        if key not in self._own:
             self._foreign = now, parent.lstrip('/')
 
     def free(self, now: float) -> bool:

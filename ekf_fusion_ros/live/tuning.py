@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Mapping
 from typing import Any
 
 from ekf_fusion_ros.live.steering import Steering
 from ekf_fusion_ros.params.live import changed
 from ekf_fusion_ros.params.live import differences
+from ekf_fusion_ros.params.spec import leaves
 from ekf_fusion_ros.params.tree import Params
 from ekf_fusion_ros.params.tree import with_overrides
 from ekf_fusion_ros.session import FusionSession
@@ -20,38 +22,62 @@ class Tuning:
 
     def __init__(self, params: Params, session: FusionSession, steering: Steering) -> None:
         """Begin with the parameters that the session was made with."""
-        self._params = params
         self._session = session
+        self._adopt(params)
         self._steering = steering
 
     def obstacle(self, changes: Mapping[str, Any]) -> str:
         """Return in one sentence why these changes cannot be made together, '' where they can."""
+        news = self._news(changes)
+        if not news:
+            return ''
         try:
-            after = changed(self._params, changes)
+            after = changed(self._params, news)
         except ValueError as error:
             return str(error)
-        refusals = [self._steering.obstacle(*one) for one in switches(changes, after)]
+        refusals = [self._steering.obstacle(*one) for one in switches(news, after)]
         return next(filter(None, refusals), '')
 
     def change(self, changes: Mapping[str, Any]) -> None:
         """Make changes that `obstacle` has nothing against, and announce what is new."""
-        before, self._params = self._params, changed(self._params, changes)
-        for role, on in switches(changes, self._params):
+        news = self._news(changes)
+        if not news:
+            return
+        before, after = self._params, changed(self._params, news)
+        self._adopt(after)
+        for role, on in switches(news, after):
             self._steering.switch(role, on)
-        news = [one for one in differences(before, self._params) if not one[0].startswith(SWITCH)]
-        if news:
-            self._session.adopt(self._params)
-            words = ', '.join(f'{name} = {new} (was {old})' for name, old, new in news)
+        told = [one for one in differences(before, after) if not one[0].startswith(SWITCH)]
+        if told:
+            self._session.adopt(after)
+            words = ', '.join(f'{name} = {new} (was {old})' for name, old, new in told)
             self._session.announce(f'parameters changed on request: {words}')
 
     def mount(self, mounting: Mapping[str, Any]) -> None:
         """Take the mounting of sensors of which nothing was fused yet."""
-        self._params = with_overrides(self._params, mounting)
+        self._adopt(with_overrides(self._params, mounting))
         self._session.adopt(self._params)
         words = ', '.join(
             f'{name} = ({", ".join(f"{part:.4g}" for part in value)})'
             for name, value in mounting.items())
         self._session.announce(f'mounting by /tf_static: {words}')
+
+    def _adopt(self, params: Params) -> None:
+        self._params = params
+        self._values = {name: value for name, value, _ in leaves(params)}
+
+    def _news(self, changes: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what is not so already; a whole file of parameters holds little of that.
+
+        Inputs count always: a service may have switched them.
+        """
+        return {name: value for name, value in changes.items()
+                if name.startswith(SWITCH) or self._values.get(name) != comparable(value)}
+
+
+def comparable(value: Any) -> Any:
+    """Return a value of ROS, where lists are arrays, as our parameters have it."""
+    return tuple(value) if isinstance(value, (list, array)) else value
 
 
 def switches(changes: Mapping[str, Any], params: Params) -> list[tuple[str, bool]]:

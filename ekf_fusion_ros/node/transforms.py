@@ -89,7 +89,8 @@ class Transforms:
         """Take a TFMessage of anybody."""
         now = time.monotonic()
         for one in message.transforms:
-            self._watch.hear(one.header.frame_id, one.child_frame_id, key_of(one), now)
+            if one.child_frame_id.lstrip('/') == self._child:
+                self._watch.hear(one.header.frame_id, key_of(one), now)
 
     def report(self) -> Report:
         """Say what is published, or why nothing is."""

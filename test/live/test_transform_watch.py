@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ekf_fusion_ros.estimator import HealthLevel
 from ekf_fusion_ros.live.transform_watch import FOREIGN_S
+from ekf_fusion_ros.live.transform_watch import OWN_KEPT
 from ekf_fusion_ros.live.transform_watch import TransformWatch
 
 OWN = (5, 1.0, 2.0, 3.0)
@@ -14,23 +15,27 @@ def test_its_own_transform_coming_back_is_no_foreign_one() -> None:
     watch = TransformWatch('map', 'odom')
     assert watch.sentence(0.0) == 'map -> odom waits for the first estimate'
     watch.note_own(OWN)
-    watch.hear('map', 'odom', OWN, 0.0)
+    watch.hear('map', OWN, 0.0)
     assert watch.free(0.0)
     assert watch.news(0.0) == ''
     assert watch.report(0.0).text == 'publishing map -> odom'
     assert watch.report(0.0).level == HealthLevel.OK
 
 
-def test_other_children_do_not_matter() -> None:
+def test_old_ones_of_its_own_are_forgotten() -> None:
     watch = TransformWatch('map', 'odom')
-    watch.hear('odom', 'base_link', OTHER, 0.0)
+    for stamp in range(OWN_KEPT + 1):
+        watch.note_own((stamp, 0.0, 0.0, 0.0))
+    watch.hear('map', (1, 0.0, 0.0, 0.0), 0.0)
     assert watch.free(0.0)
+    watch.hear('map', (0, 0.0, 0.0, 0.0), 0.0)
+    assert not watch.free(0.0)
 
 
 def test_another_publisher_stops_it_until_it_has_been_silent_for_long() -> None:
     watch = TransformWatch('map', 'odom')
     watch.note_own(OWN)
-    watch.hear('/world', '/odom', OTHER, 10.0)
+    watch.hear('/world', OTHER, 10.0)
     assert not watch.free(10.0)
     line = watch.news(10.0)
     assert line == ('map -> odom is not published: another node publishes world -> odom; stop '

@@ -145,7 +145,10 @@ def test_what_another_node_publishes_is_left_to_it(monkeypatch: pytest.MonkeyPat
     bench.transforms.hear(heard)
     bench.transforms.publish(state(1_001_020_000, (0.0, 0.0, 0.0), 0.0))
     assert len(bench.sent) == 2
-    foreign = TransformStamped(child_frame_id='base_link')
+    heard.transforms = [TransformStamped(child_frame_id='camera_link')]
+    bench.transforms.hear(heard)
+    assert bench.transforms.report().text == 'publishing odom -> base_link'
+    foreign = TransformStamped(child_frame_id='/base_link')
     foreign.header.frame_id = 'vio_odom'
     heard.transforms = [foreign]
     bench.transforms.hear(heard)
