@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ekf_fusion_ros.estimator import GivenPose
 from ekf_fusion_ros.inputs import make_estimator
 from ekf_fusion_ros.inputs import make_odometry_imu
 from ekf_fusion_ros.kernels.compile import COMPILED
@@ -65,6 +66,7 @@ def warm_up(params: Params, stopped: Callable[[], bool] = lambda: False) -> None
         if isinstance(sample, ImuSample):
             estimator.update()
             estimator.nav_state()
+    estimator.set_pose(GivenPose(np.zeros(3), np.ones(3), 0.0, 0.01))
 
 
 def climb() -> Iterator[Sample]:

@@ -12,6 +12,15 @@ from ekf_fusion_ros.kernels.compile import COMPILED
 PROGRAM = """
 import sys
 
+import numpy as np
+
+from ekf_fusion_ros.estimator import GivenPose
+from ekf_fusion_ros.mathlib.rigid import Pose
+from ekf_fusion_ros.mathlib.rigid import compose
+from ekf_fusion_ros.mathlib.rigid import interpolate
+from ekf_fusion_ros.mathlib.rigid import inverse
+from ekf_fusion_ros.mathlib.rotation import euler_321
+from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
 from ekf_fusion_ros.params import Params
 from ekf_fusion_ros.roles import SUPPORTED
 from ekf_fusion_ros.roles import configure
@@ -43,6 +52,10 @@ assert fused['magnetic_field'] > 0, fused
 assert fused['gnss_position'] > 0, fused
 assert fused['vision_velocity'] > 0, fused
 assert len(before) > 10, before
+assert session.set_pose(GivenPose(np.zeros(3), np.ones(3), 1.0, 0.1))
+pose = Pose(np.zeros(3), np.array((0.6, 0.0, 0.0, 0.8)))
+compose(inverse(pose), interpolate(pose, inverse(pose), 0.3))
+euler_321(matrix_from_quat(pose.quaternion))
 late = compiled() - before
 assert not late, late
 """
