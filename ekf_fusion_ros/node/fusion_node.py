@@ -75,7 +75,7 @@ class FusionNode(Node):  # type: ignore[misc]
             self, self._session, self._inputs, self._switches, self._work, self._navigation,
             lambda: len(self._intake))
         self._transforms = make_transforms(
-            self, self._params, lambda: self._session.params.messages.odometry)
+            self, self._params, lambda: self._session.params.messages.odometry, self._guard)
         if self._transforms is not None:
             self._reporting.further.append(self._transforms.report)
         self._preparation: Preparation | None = None

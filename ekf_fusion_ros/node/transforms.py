@@ -19,6 +19,7 @@ from ekf_fusion_ros.live.transform_watch import TransformWatch
 from ekf_fusion_ros.mathlib.rigid import Pose
 from ekf_fusion_ros.messages.odometry_pose import odometry_pose
 from ekf_fusion_ros.messages.refusal import Refused
+from ekf_fusion_ros.node.guard import Guard
 from ekf_fusion_ros.node.optional import imported
 from ekf_fusion_ros.node.publishers import stamp_message
 from ekf_fusion_ros.params.messages import OdometryMessageParams
@@ -98,7 +99,7 @@ class Transforms:
 
 
 def make_transforms(
-    node: Node, params: Params, odometry: Callable[[], OdometryMessageParams],
+    node: Node, params: Params, odometry: Callable[[], OdometryMessageParams], guard: Guard,
 ) -> Transforms | None:
     """Return what publishes TF, None where that is not wanted.
 
@@ -115,7 +116,7 @@ def make_transforms(
     transforms = Transforms(
         params, odometry, lambda messages: publisher.publish(kind(transforms=messages)),
         lambda text: node.get_logger().warning(text))
-    node.create_subscription(kind, TOPIC, transforms.hear, QoSProfile(depth=DEPTH))
+    node.create_subscription(kind, TOPIC, guard(transforms.hear), QoSProfile(depth=DEPTH))
     return transforms
 
 
