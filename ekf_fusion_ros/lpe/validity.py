@@ -34,8 +34,8 @@ class Validity:
 
         aided: at least one sensor of horizontal position or velocity, gnss and baro: that one.
         """
-        precise = max(P[VN, VN], P[VE, VE]) < params.velocity_sigma_max ** 2
-        self.horizontal = bool(precise and aided) or self.horizontal and bool(precise or gnss)
+        precise = bool(max(P[VN, VN], P[VE, VE]) < params.velocity_sigma_max ** 2)
+        self.horizontal = (precise or gnss) if self.horizontal else (precise and aided)
         known = bool(P[PD, PD] < params.height_sigma_max ** 2)
-        self.height = known or self.height and baro
+        self.height = known or (self.height and baro)
         self.terrain = bool(P[TERRAIN, TERRAIN] < params.height_sigma_max ** 2)
