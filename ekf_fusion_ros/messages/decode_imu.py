@@ -95,11 +95,11 @@ def decode_imu_rows(rows: FlatRows, params: MessageParams) -> list[ImuReading | 
     present = good & (columns[ORIENTATION_COVARIANCE] != ABSENT)
     columns = np.where(good, columns, 0.0)
     rates, forces = (
-        zip(*(column.tolist() for column in turned_to_body(columns[name], imu.mount_rpy,
-                                                           rows.frame_id)), strict=True)
+        np.stack(turned_to_body(columns[name], imu.mount_rpy, rows.frame_id), axis=1)
         for name in (RATE, FORCE))
-    readings = [ImuReading(*reading) if plain else None for plain, *reading in zip(
-        good.tolist(), times.tolist(), rates, forces, strict=True)]
+    readings = [ImuReading(time_us, rate, force) if plain else None
+                for plain, time_us, rate, force in zip(
+                    good.tolist(), times.tolist(), rates, forces, strict=True)]
     for k in np.flatnonzero(present).tolist():
         orientation = _orientation(rows.numbers[k, ORIENTATION].tolist(), rows.frame_id, imu)
         readings[k] = cast(ImuReading, readings[k])._replace(orientation=orientation)
@@ -191,10 +191,8 @@ class ImuIntegrator:
 
 def _increments(reading: ImuReading, step_us: int) -> ImuSample:
     dt = step_us * 1e-6
-    p, q, r = reading.rate
-    x, y, z = reading.specific_force
     return ImuSample(
-        reading.time_us, np.array((p * dt, q * dt, r * dt)), np.array((x * dt, y * dt, z * dt)),
+        reading.time_us, np.multiply(reading.rate, dt), np.multiply(reading.specific_force, dt),
         dt, dt, orientation=reading.orientation)
 
 
