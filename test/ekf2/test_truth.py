@@ -144,6 +144,7 @@ def test_without_noise_the_error_vanishes():
     assert np.degrees(np.abs(flown.yaw)).max() < 0.2
 
 
+@pytest.mark.slow
 def test_the_acceleration_told_is_that_of_the_vehicle():
     scenario = Scenario(trajectory=FLIGHT, sensors=perfect_sensors(), seed=0)
     ekf, errors = Ekf2(Ekf2Params()), []

@@ -77,6 +77,7 @@ def yaw_errors(motor_field, seed):
     return time, np.degrees((error + math.pi) % (2.0 * math.pi) - math.pi), ekf
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('seed', [1, 2, 3])
 def test_a_compass_that_motors_turn_at_take_off_is_found_out(seed):
     time, error, ekf = yaw_errors((-0.35, 0.3, 0.0), seed)
@@ -89,6 +90,7 @@ def test_a_compass_that_motors_turn_at_take_off_is_found_out(seed):
     assert np.abs(error[time > 60.0]).max() < 10.0
 
 
+@pytest.mark.slow
 def test_a_compass_that_motors_hardly_turn_is_kept():
     _, error, ekf = yaw_errors((0.02, 0.0, 0.0), 1)
     assert EventKind.EMERGENCY_YAW_RESET not in ekf.filter.events.seen

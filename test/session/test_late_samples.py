@@ -57,7 +57,8 @@ def counts(session, role):
     return statistics.accepted, dict(statistics.refused)
 
 
-@pytest.mark.parametrize('share', [0.35, 0.7, 1.0])
+@pytest.mark.parametrize('share', [
+    pytest.param(0.35, marks=pytest.mark.slow), pytest.param(0.7, marks=pytest.mark.slow), 1.0])
 @pytest.mark.parametrize('role', ON_BOARD)
 def test_late_within_the_horizon_is_as_good_as_in_time(role, share):
     prompt = flown(role, 0.0)
