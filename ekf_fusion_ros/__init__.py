@@ -18,8 +18,10 @@ if TYPE_CHECKING:
     from ekf_fusion_ros.estimator import GivenPose
     from ekf_fusion_ros.estimator import Health
     from ekf_fusion_ros.estimator import NavState
+    from ekf_fusion_ros.lpe.lpe import Lpe
     from ekf_fusion_ros.params.ekf2 import Ekf2Params
     from ekf_fusion_ros.params.files import load_file
+    from ekf_fusion_ros.params.lpe import LpeParams
     from ekf_fusion_ros.params.tree import Params
     from ekf_fusion_ros.params.tree import with_overrides
     from ekf_fusion_ros.samples import AirspeedSample
@@ -40,9 +42,11 @@ __version__ = '0.1.0'
 
 _HOMES = {
     'ekf2.ekf2': ('Ekf2',),
+    'lpe.lpe': ('Lpe',),
     'estimator': (
         'AidStatus', 'Estimator', 'Event', 'GeoPoint', 'GivenPose', 'Health', 'NavState'),
     'params.ekf2': ('Ekf2Params',),
+    'params.lpe': ('LpeParams',),
     'params.files': ('load_file',),
     'params.tree': ('Params', 'with_overrides'),
     'samples': (
@@ -81,6 +85,8 @@ __all__ = [
     'Health',
     'ImuSample',
     'LandedSample',
+    'Lpe',
+    'LpeParams',
     'MagSample',
     'NavState',
     'Params',

@@ -149,13 +149,22 @@ class InertialInput:
 
 def make_estimator(params: Params) -> Estimator:
     """Return the estimator that the parameters name."""
+    if params.estimator == 'lpe':
+        from ekf_fusion_ros.lpe.lpe import Lpe
+        return Lpe(params.lpe)
     from ekf_fusion_ros.ekf2.ekf2 import Ekf2
     return Ekf2(params.ekf2)
 
 
 def adopt_params(estimator: Estimator, params: Params) -> None:
     """Let an estimator of `make_estimator` go on with other parameters."""
-    estimator.adopt(params.ekf2)
+    estimator.adopt(params.lpe if params.estimator == 'lpe' else params.ekf2)
+
+
+def uses_fixes(params: Params) -> bool:
+    """Return whether the estimator that the parameters name takes fixes."""
+    gnss = params.lpe.gnss if params.estimator == 'lpe' else params.ekf2.gnss
+    return gnss.enabled
 
 
 def make_odometry_imu(params: Params) -> Any:
@@ -170,4 +179,6 @@ def make_motion_heading(params: Params, roles: Collection[str]) -> Any:
         return None
     from ekf_fusion_ros.motion_heading import MotionHeading
     delay_ms = params.ekf2.gnss.delay_ms - params.ekf2.vision.delay_ms
+    if params.estimator == 'lpe':
+        delay_ms = 1000.0 * (params.lpe.gnss.delay - params.lpe.vision.delay)
     return MotionHeading(params.two_topic, round(1000 * delay_ms))

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 from typing import Any
+from typing import TypeVar
 
 from ekf_fusion_ros.buffer import MAX_AGE_US
 from ekf_fusion_ros.messages.decode_odometry import has_true_heading
 from ekf_fusion_ros.messages.mounting import with_mounting
 
 if TYPE_CHECKING:
+    from ekf_fusion_ros.params.ekf2 import Ekf2Params
+    from ekf_fusion_ros.params.lpe import LpeParams
     from ekf_fusion_ros.params.tree import Params
 
 ODOMETRY = 'odometry'
@@ -50,6 +54,9 @@ DELAYS = {
 }
 
 
+Tree = TypeVar('Tree', 'Ekf2Params', 'LpeParams')
+
+
 def check_roles(roles: Collection[str]) -> None:
     """Raise ValueError for a set of roles that cannot be fused."""
     for role in roles:
@@ -65,23 +72,28 @@ def check_roles(roles: Collection[str]) -> None:
 def configure(params: Params, roles: Collection[str]) -> Params:
     """Return the parameters in effect for these roles.
 
-    Only values of `params.ekf2` that stand at their default are changed, so that a value chosen
-    by the user wins. What the estimator has no parameter for is not asked of it.
+    Only values of `params.ekf2` and `params.lpe` that stand at their default are changed, so that
+    a value chosen by the user wins. What the estimator has no parameter for is not asked of it.
     """
     check_roles(roles)
     params = replace(params, ekf2=with_mounting(params.ekf2, params.messages))
     if not params.session.automatic_aiding:
         return params
-    ekf2 = params.ekf2
-    for group, wanted in _wanted(params, roles).items():
-        current = getattr(ekf2, group, None)
+    return replace(params, ekf2=_with_wanted(params.ekf2, _wanted(params, roles)),
+                   lpe=_with_wanted(params.lpe, _wanted_of_lpe(params, roles)))
+
+
+def _with_wanted(tree: Tree, by_group: Mapping[str, Mapping[str, Any]]) -> Tree:
+    """Return parameters of an estimator with wanted values where they stand at their default."""
+    for group, wanted in by_group.items():
+        current = getattr(tree, group, None)
         if current is None:
             continue
         default = type(current)()
         changes = {name: value for name, value in wanted.items() if hasattr(current, name)
                    and getattr(current, name) == getattr(default, name)}
-        ekf2 = replace(ekf2, **{group: replace(current, **changes)})
-    return replace(params, ekf2=ekf2)
+        tree = replace(tree, **{group: replace(current, **changes)})
+    return tree
 
 
 def _wanted(params: Params, roles: Collection[str]) -> dict[str, dict[str, Any]]:
@@ -112,6 +124,18 @@ def _wanted(params: Params, roles: Collection[str]) -> dict[str, dict[str, Any]]
         wanted['flow'] = {'enabled': True}
     if IMU not in roles:
         _add_odometry_as_imu(wanted)
+    return wanted
+
+
+def _wanted_of_lpe(params: Params, roles: Collection[str]) -> dict[str, dict[str, Any]]:
+    """Return the values of lpe that these roles call for."""
+    own_frame = FIX not in roles or has_true_heading(params.messages.odometry)
+    wanted: dict[str, dict[str, Any]] = {
+        'gnss': {'enabled': FIX in roles}, 'flow': {'enabled': FLOW in roles}}
+    if ODOMETRY in roles:
+        wanted['attitude'] = {'odometry_yaw': own_frame}
+        wanted['vision'] = {
+            'enabled': FIX not in roles, 'delay': 1e-3 * params.session.odometry_delay_ms}
     return wanted
 
 

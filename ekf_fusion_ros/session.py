@@ -33,6 +33,7 @@ from ekf_fusion_ros.inputs import decoder_of
 from ekf_fusion_ros.inputs import make_estimator
 from ekf_fusion_ros.inputs import make_motion_heading
 from ekf_fusion_ros.inputs import rows_decoder_of
+from ekf_fusion_ros.inputs import uses_fixes
 from ekf_fusion_ros.map_origin import fixed_origin
 from ekf_fusion_ros.messages.flat import FlatRows
 from ekf_fusion_ros.messages.refusal import Refused
@@ -123,7 +124,7 @@ class FusionSession:
 
     def _is_local(self) -> bool:
         if self.roles is None:
-            return not self.params.ekf2.gnss.enabled
+            return not uses_fixes(self.params)
         return FIX not in self.roles
 
     def _forget(self) -> None:

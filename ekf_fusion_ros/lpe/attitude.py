@@ -103,10 +103,12 @@ class Attitude:
         elif not self._fresh(self._odometry_us, imu.time_us):
             self._filter_step(imu)
 
-    def push_odometry(self, sample: VisionSample) -> None:
-        """Note an odometry sample; it acts once inertial time has reached it."""
-        if sample.has_attitude and self.params.source in ('auto', 'odometry'):
+    def push_odometry(self, sample: VisionSample) -> bool:
+        """Note an odometry sample; it acts once inertial time has reached it. False if never."""
+        wanted = sample.has_attitude and self.params.source in ('auto', 'odometry')
+        if wanted:
             self._odometry = sample
+        return wanted and self.source != 'imu'
 
     def push_heading(self, sample: HeadingSample) -> None:
         """Take the heading of the odometry frame against north."""

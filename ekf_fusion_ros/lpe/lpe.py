@@ -77,14 +77,15 @@ class Lpe:
             self._push_to_sensor(sample)
 
     def _push_to_sensor(self, sample: Sample) -> None:
+        attitude, used = self.filter.attitude, False
         if isinstance(sample, VisionSample):
-            self.filter.attitude.push_odometry(sample)
+            used = attitude.push_odometry(sample)
         elif isinstance(sample, GnssSample):
-            self.filter.attitude.push_fix(sample)
+            attitude.push_fix(sample)
         sensor_of = self.sensors.takes.get(type(sample))
         if sensor_of is None:
             self._pass_over(type(sample), 'no_such_sensor')
-        else:
+        elif not used or sensor_of(sample).enabled():
             sensor_of(sample).push(sample)
 
     def _pass_over(self, kind: type, reason: str) -> None:

@@ -16,7 +16,7 @@ class SessionParams:
         'update.', unit='Hz', min=0, max=1000)
     automatic_aiding: bool = param(
         True, 'Let the roles in use choose height reference, magnetometer and odometry aiding. A '
-        'value of ekf2 that differs from its default wins.')
+        'value of ekf2 or lpe that differs from its default wins.')
     horizon_ms: float = param(
         200.0, 'Shortest delay of the fusion horizon: the time by which messages may be late '
         'after their stamp.', unit='ms', min=0, max=2000)

@@ -24,6 +24,7 @@ from ekf_fusion_ros.params.spec import param
 from ekf_fusion_ros.params.spec import validate
 from ekf_fusion_ros.params.two_topic import TwoTopicParams
 
+ESTIMATORS = ('ekf2', 'lpe')
 TRUE_WORDS = ('true', 'yes', 'on', '1')
 FALSE_WORDS = ('false', 'no', 'off', '0')
 
@@ -32,7 +33,9 @@ FALSE_WORDS = ('false', 'no', 'off', '0')
 class Params:
     """Everything the node, the replay and the library can be told."""
 
-    estimator: str = param('ekf2', 'Which estimator runs.', choices=('ekf2',))
+    estimator: str = param(
+        'ekf2', 'Which estimator runs: the 24 states of EKF2, or the 10 of PX4\'s local position '
+        'estimator, which takes attitude as given.', choices=ESTIMATORS)
     ekf2: Ekf2Params = field(default_factory=Ekf2Params)
     lpe: LpeParams = field(default_factory=LpeParams)
     messages: MessageParams = field(default_factory=MessageParams)
@@ -40,11 +43,6 @@ class Params:
     health: HealthParams = field(default_factory=HealthParams)
     two_topic: TwoTopicParams = field(default_factory=TwoTopicParams)
     node: NodeParams = field(default_factory=NodeParams)
-
-    def __post_init__(self) -> None:
-        """Raise ValueError for the estimator that is named but not there yet."""
-        if self.estimator == 'lpe':
-            raise ValueError("estimator = 'lpe' comes in a later release: choose ekf2")
 
 
 def with_overrides(params: Params, overrides: Mapping[str, Any]) -> Params:

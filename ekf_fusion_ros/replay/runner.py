@@ -151,7 +151,8 @@ class _Run:
         self.options = options
         self.progress = progress
         _make_folder(options)
-        self._states = StateSink(options.output) if options.log_states else None
+        self._states = StateSink(options.output, options.params.estimator) \
+            if options.log_states else None
         self.session = FusionSession(
             options.params, roles, on_update=self._states.write if self._states else None)
         self._track = TrajectorySink(options.output)

@@ -149,11 +149,13 @@ class BagSink:
 
 
 class StateSink:
-    """estimator.csv: one row a filter update, the columns of the parity comparison."""
+    """estimator.csv: one row a filter update; of EKF2 the columns of the parity comparison."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, estimator: str) -> None:
         from ekf_fusion_ros.replay.estimator_log import EstimatorLog
-        self._log = EstimatorLog(folder / 'estimator.csv')
+        from ekf_fusion_ros.replay.lpe_log import LpeLog
+        kind = LpeLog if estimator == 'lpe' else EstimatorLog
+        self._log: LpeLog | EstimatorLog = kind(folder / 'estimator.csv')
 
     def write(self, estimator: Any) -> None:
         """Add a row; called after each filter update."""

@@ -89,9 +89,10 @@ def test_unknown_name_is_answered_with_the_nearest(name: str, near: str) -> None
     assert name in str(caught.value)
 
 
-def test_estimator_of_a_later_release_is_refused_in_words() -> None:
-    with pytest.raises(ValueError, match='later release'):
-        with_overrides(Params(), {'estimator': 'lpe'})
+def test_an_estimator_that_is_not_there_is_refused_with_those_that_are() -> None:
+    assert with_overrides(Params(), {'estimator': 'lpe'}).estimator == 'lpe'
+    with pytest.raises(ValueError, match='ekf2, lpe'):
+        with_overrides(Params(), {'estimator': 'inav'})
 
 
 def test_every_parameter_has_words_and_a_default_inside_its_range() -> None:
