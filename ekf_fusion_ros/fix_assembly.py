@@ -12,7 +12,9 @@ from ekf_fusion_ros.pairing import FixPairing
 from ekf_fusion_ros.pairing import Part
 from ekf_fusion_ros.pairing import with_heading
 from ekf_fusion_ros.pairing import with_velocity
+from ekf_fusion_ros.roles import FIX_OF_PART
 from ekf_fusion_ros.roles import FIX_VELOCITY
+from ekf_fusion_ros.roles import FIX_VELOCITY_2
 from ekf_fusion_ros.roles import GPS_HEADING
 from ekf_fusion_ros.samples import GnssSample
 from ekf_fusion_ros.statistics import RoleStatistics
@@ -24,7 +26,7 @@ RELEASE_US = 20_000
 """Time that the way of a fix from here to the filter may take, two of its periods."""
 
 JOINS: dict[str, Callable[..., GnssSample]] = {
-    FIX_VELOCITY: with_velocity, GPS_HEADING: with_heading}
+    FIX_VELOCITY: with_velocity, GPS_HEADING: with_heading, FIX_VELOCITY_2: with_velocity}
 
 
 class FixAssembly:
@@ -35,16 +37,16 @@ class FixAssembly:
     """
 
     def __init__(
-        self, statistics: Mapping[str, RoleStatistics], roles: Collection[str],
+        self, fix: str, statistics: Mapping[str, RoleStatistics], roles: Collection[str],
         params: SessionParams, age_limit_us: int,
     ) -> None:
-        """Pair with the topics in `roles`; `statistics` counts what stays alone.
+        """Pair role `fix` with its topics in `roles`; `statistics` counts what stays alone.
 
         No fix waits until it is older than age_limit_us: the filter could not take it any more.
         """
         tolerance_us = round(1e6 * params.pairing_tolerance)
         wait_us = min(round(1e6 * params.pairing_wait), age_limit_us - RELEASE_US)
-        self._stages = [role for role in JOINS if role in roles]
+        self._stages = [role for role in JOINS if role in roles and FIX_OF_PART[role] == fix]
         self._pairings = [FixPairing(statistics[role], tolerance_us, wait_us, JOINS[role])
                           for role in self._stages]
         self.waiting = False

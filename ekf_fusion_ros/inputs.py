@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Collection
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 from typing import Any
@@ -31,7 +32,9 @@ from ekf_fusion_ros.roles import AIRSPEED
 from ekf_fusion_ros.roles import ARMED
 from ekf_fusion_ros.roles import AUX_VELOCITY
 from ekf_fusion_ros.roles import FIX
+from ekf_fusion_ros.roles import FIX_2
 from ekf_fusion_ros.roles import FIX_VELOCITY
+from ekf_fusion_ros.roles import FIX_VELOCITY_2
 from ekf_fusion_ros.roles import FLOW
 from ekf_fusion_ros.roles import GPS_HEADING
 from ekf_fusion_ros.roles import IMU
@@ -61,6 +64,8 @@ DECODERS: dict[str, Callable[..., Any]] = {
     FIX: decode_fix,
     FIX_VELOCITY: decode_fix_velocity,
     IMU: decode_imu,
+    FIX_2: decode_fix,
+    FIX_VELOCITY_2: decode_fix_velocity,
     MAGNETIC_FIELD: decode_magnetic_field,
     PRESSURE: decode_pressure,
     RANGE: decode_range,
@@ -103,7 +108,10 @@ JUMPS = {
 
 def decoder_of(role: str, params: Params) -> Callable[[Any], Any]:
     """Return the function that turns a message of `role` into a stamped sample."""
-    return partial(DECODERS[role], params=params.messages)
+    messages = params.messages
+    if role in (FIX_2, FIX_VELOCITY_2):
+        messages = replace(messages, fix=messages.fix_2, fix_velocity=messages.fix_velocity_2)
+    return partial(DECODERS[role], params=messages)
 
 
 def rows_decoder_of(role: str, params: Params) -> Callable[[FlatRows], Sequence[Any]] | None:

@@ -31,15 +31,22 @@ LANDED = 'landed'
 GPS_HEADING = 'gps_heading'
 AUX_VELOCITY = 'aux_velocity'
 ARMED = 'armed'
+FIX_2 = 'fix_2'
+FIX_VELOCITY_2 = 'fix_velocity_2'
 
 SUPPORTED = (
     ODOMETRY, FIX, FIX_VELOCITY, IMU, MAGNETIC_FIELD, PRESSURE, RANGE, FLOW, AIRSPEED, LANDED,
-    GPS_HEADING, AUX_VELOCITY, ARMED)
+    GPS_HEADING, AUX_VELOCITY, ARMED, FIX_2, FIX_VELOCITY_2)
 WITHOUT_STAMP = (LANDED, ARMED)
 """Roles whose messages act when they come."""
 
-PARTS_OF_FIX = (FIX_VELOCITY, GPS_HEADING)
-"""Roles whose messages belong to the fix of the same stamp."""
+FIXES = (FIX, FIX_2)
+"""One role for each receiver; the first leads where one must: its delay, its fix at the start."""
+
+FIX_OF_PART = {FIX_VELOCITY: FIX, GPS_HEADING: FIX, FIX_VELOCITY_2: FIX_2}
+"""Roles whose messages belong to the fix of the same stamp, and the role of that fix."""
+
+PARTS_OF_FIX = tuple(FIX_OF_PART)
 
 # Where ekf2 keeps the delay of a role.
 DELAYS = {
@@ -64,9 +71,9 @@ def check_roles(roles: Collection[str]) -> None:
             raise ValueError(f'unknown role {role!r}: choose of {", ".join(SUPPORTED)}')
     if IMU not in roles and ODOMETRY not in roles:
         raise ValueError('no inertial input: give an odometry or an imu topic')
-    for role in PARTS_OF_FIX:
-        if role in roles and FIX not in roles:
-            raise ValueError(f'role {role} needs a fix topic beside it')
+    for role, fix in ((FIX_2, FIX), *FIX_OF_PART.items()):
+        if role in roles and fix not in roles:
+            raise ValueError(f'role {role} needs a {fix} topic beside it')
 
 
 def configure(params: Params, roles: Collection[str]) -> Params:
@@ -100,7 +107,7 @@ def _wanted(params: Params, roles: Collection[str]) -> dict[str, dict[str, Any]]
     """Return the values these roles call for, by group of ekf2."""
     has_fix = FIX in roles
     wanted: dict[str, dict[str, Any]] = {
-        'timing': {'horizon_min_ms': _horizon_ms(params)},
+        'timing': {'horizon_min_ms': _horizon_ms(params, roles)},
         'gnss': {'enabled': has_fix},
     }
     if PRESSURE not in roles:
@@ -171,16 +178,17 @@ def age_limit_us(params: Params, role: str) -> int:
     if role in PARTS_OF_FIX:
         # it goes with its fix, and pairing tells which come too late for that
         return round(1e6 * session.stamp_age_max)
-    delays = _delays_ms(params)
+    delays = {**_delays_ms(params), **_further_delays_ms(params, (role,))}
     horizon_ms = max(ekf2.timing.horizon_min_ms, *delays.values())
     usable_ms = horizon_ms - delays.get(role, 0.0) - session.hold_ms
     return min(round(1e6 * session.stamp_age_max), round(1e3 * usable_ms) + MAX_AGE_US)
 
 
-def _horizon_ms(params: Params) -> float:
+def _horizon_ms(params: Params, roles: Collection[str]) -> float:
     """Return a horizon behind every delay in use and the hold of the session."""
     session = params.session
-    delays = {**_delays_ms(params), ODOMETRY: session.odometry_delay_ms}
+    delays = {**_delays_ms(params), **_further_delays_ms(params, roles),
+              ODOMETRY: session.odometry_delay_ms}
     return max(session.horizon_ms, max(delays.values()) + 2.0 * session.hold_ms)
 
 
@@ -190,3 +198,9 @@ def _delays_ms(params: Params) -> dict[str, float]:
               for role, (group, name) in DELAYS.items()}
     return {role: float(getattr(group, name)) for role, (group, name) in groups.items()
             if hasattr(group, name)}
+
+
+def _further_delays_ms(params: Params, roles: Collection[str]) -> dict[str, float]:
+    """Return the delays of receivers beside the first, of those among the roles."""
+    return {role: float(getattr(params.receivers, role).delay_ms)
+            for role in FIXES[1:] if role in roles}

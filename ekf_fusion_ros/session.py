@@ -22,7 +22,7 @@ from ekf_fusion_ros.estimator import GivenPose
 from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import HealthLevel
 from ekf_fusion_ros.estimator import NavState
-from ekf_fusion_ros.fix_assembly import FixAssembly
+from ekf_fusion_ros.fix_intake import FixIntake
 from ekf_fusion_ros.fused_output import FusedOutput
 from ekf_fusion_ros.health.status import NavigationStatus
 from ekf_fusion_ros.holding import Holding
@@ -39,9 +39,11 @@ from ekf_fusion_ros.messages.flat import FlatRows
 from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.navigation_watch import NavigationWatch
 from ekf_fusion_ros.odometry_heading import OdometryHeading
+from ekf_fusion_ros.receivers.bank import ReceiverStatus
 from ekf_fusion_ros.roles import AIRSPEED
 from ekf_fusion_ros.roles import ARMED
 from ekf_fusion_ros.roles import FIX
+from ekf_fusion_ros.roles import FIXES
 from ekf_fusion_ros.roles import IMU
 from ekf_fusion_ros.roles import LANDED
 from ekf_fusion_ros.roles import ODOMETRY
@@ -142,8 +144,8 @@ class FusionSession:
         self._heading = OdometryHeading()
         self._holding = Holding(round(1000 * session.hold_ms))
         self._completion = Completion(self.params.messages)
-        self._assembly = FixAssembly(
-            self._statistics, roles, session, age_limit_us(self.params, FIX))
+        self._intake = FixIntake(
+            self._statistics, roles, self.params, self._estimator.nav_state)
         self._inertial = InertialInput(self.params, self._inertial_role) if roles else None
         self._motion = make_motion_heading(self.params, roles)
 
@@ -219,7 +221,7 @@ class FusionSession:
         """Take in what is still held or waits for a partner; after this the counts are exact."""
         for role, sample in self._holding.flush():
             self._aid(role, sample)
-        self._push_fixes(self._assembly.flush())
+        self._push_fixes(self._intake.flush())
 
     def _push_directly(self, sample: Sample) -> list[FusedOutput]:
         if isinstance(sample, ImuSample):
@@ -276,7 +278,7 @@ class FusionSession:
         if role == ARMED:
             self._navigation.note(sample)
             return []
-        if role == FIX:
+        if role in FIXES:
             sample = self._with_height(sample)
         self._holding.push(role, sample)
         for due in self._holding.release(self._now_us):
@@ -302,10 +304,10 @@ class FusionSession:
     def _aid(self, role: str, sample: Any) -> None:
         """Hand an aiding sample to the estimator and to what looks for yaw in motion."""
         if role in PARTS_OF_FIX:
-            self._push_fixes(self._assembly.push(role, sample))
-        elif role == FIX:
+            self._push_fixes(self._intake.push(role, sample))
+        elif role in FIXES:
             self._completion.note_fix(sample)
-            self._push_fixes(self._assembly.push_fix(sample))
+            self._push_fixes(self._intake.push_fix(role, sample))
         elif role == ODOMETRY:
             self._push_odometry(sample)
         else:
@@ -326,6 +328,7 @@ class FusionSession:
         self._estimator.push(sample if self._inertial is None else self._inertial.fused(sample))
 
     def _push_fixes(self, fixes: Sequence[GnssSample]) -> None:
+        self._note(self._intake.drain_events())
         for fix in fixes:
             self._push_fix(fix)
 
@@ -349,13 +352,13 @@ class FusionSession:
         increments = self._inertial.push(reading)
         if role == ODOMETRY:
             self._push_odometry(reading)
-        holding, assembly = self._holding, self._assembly
+        holding, intake = self._holding, self._intake
         for imu in increments:
             if holding.due(imu.time_us):
                 for due in holding.release(imu.time_us):
                     self._aid(*due)
-            if assembly.waiting:
-                self._push_fixes(assembly.advance(imu.time_us))
+            if intake.waiting:
+                self._push_fixes(intake.advance(imu.time_us))
             output = self._advance(imu)
             if output is not None:
                 outputs.append(output)
@@ -532,6 +535,10 @@ class FusionSession:
         return Health(health.level if fine else max(health.level, HealthLevel.WARN),
                       '; '.join([text, *slow]), {**health.values, **self._rates.values()})
 
+    def receivers(self) -> Sequence[ReceiverStatus]:
+        """Return what becomes of each of several receivers, nothing where there is one."""
+        return self._intake.statuses()
+
     @property
     def inertial_role(self) -> str:
         """Role whose messages drive time."""
@@ -542,9 +549,11 @@ class FusionSession:
         """First role of which nothing was accepted and without which nothing starts, or ''."""
         if self.roles is None:
             return ''
-        needed = [self._inertial_role] + ([] if self._local else [FIX])
-        missing = [role for role in needed if self._statistics[role].accepted == 0]
-        return missing[0] if missing else ''
+        if not self._statistics[self._inertial_role].accepted:
+            return self._inertial_role
+        fixes = [role for role in FIXES if role in self.roles and not self._local]
+        arrived = any(self._statistics[role].accepted for role in fixes)
+        return '' if arrived or not fixes else FIX
 
     def _waiting_for(self) -> str:
         role = self.waiting_role

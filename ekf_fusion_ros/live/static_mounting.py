@@ -22,6 +22,7 @@ GROUPS = {
     'fix': ('fix', 'gnss'),
     'magnetic_field': ('magnetic_field', ''),
     'range': ('range', 'range'),
+    'fix_2': ('fix_2', ''),
 }
 """Groups of `messages` and of `ekf2` that hold the mounting of a role."""
 

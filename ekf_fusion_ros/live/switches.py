@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from ekf_fusion_ros.roles import FIX
-from ekf_fusion_ros.roles import PARTS_OF_FIX
+from ekf_fusion_ros.roles import FIX_OF_PART
 
 DISABLED = ('disabled', 'the node is disabled: call ~/set_enabled with data: true')
 
@@ -38,7 +37,7 @@ class Switches:
 
     def is_on(self, role: str) -> bool:
         """Return whether messages of a role reach the filter; parts of a fix go with it."""
-        return role not in self._off and not (role in PARTS_OF_FIX and FIX in self._off)
+        return role not in self._off and FIX_OF_PART.get(role) not in self._off
 
     def refusal(self, role: str) -> tuple[str, str] | None:
         """Return reason and sentence why a message of a role is kept back, None if it is not."""

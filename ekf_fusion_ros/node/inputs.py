@@ -45,6 +45,8 @@ TOPICS = {
     'armed': ('armed', Bool),
     'gps_heading': ('gps_heading', PoseWithCovarianceStamped),
     'aux_velocity': ('aux_velocity', TwistWithCovarianceStamped),
+    'fix_2': ('fix_2', NavSatFix),
+    'fix_velocity_2': ('fix_velocity_2', TwistWithCovarianceStamped),
 }
 # Messages other than the usual ones, by the word in node.<role>_type.
 OTHER_TYPES = {'twist': TwistStamped, 'pose': PoseStamped, 'imu': Imu}

@@ -223,6 +223,8 @@ class MessageParams:
     odometry: OdometryMessageParams = field(default_factory=OdometryMessageParams)
     fix: FixMessageParams = field(default_factory=FixMessageParams)
     fix_velocity: FixVelocityMessageParams = field(default_factory=FixVelocityMessageParams)
+    fix_2: FixMessageParams = field(default_factory=FixMessageParams)
+    fix_velocity_2: FixVelocityMessageParams = field(default_factory=FixVelocityMessageParams)
     imu: ImuMessageParams = field(default_factory=ImuMessageParams)
     magnetic_field: MagneticFieldMessageParams = field(
         default_factory=MagneticFieldMessageParams)

@@ -44,6 +44,13 @@ class NodeParams:
     gps_heading_type: str = param(
         'pose_with_covariance', 'Message of `gps_heading`: PoseWithCovarianceStamped, '
         'PoseStamped or Imu.', choices=HEADING_TYPES)
+    use_fix_2: bool = param(
+        False, 'Subscribe to `fix_2`, a second receiver: both are blended.', live=True)
+    use_fix_velocity_2: bool = param(
+        False, 'Subscribe to `fix_velocity_2`, the velocity of the second receiver.', live=True)
+    fix_velocity_2_type: str = param(
+        'twist_with_covariance', 'Message of `fix_velocity_2`: TwistWithCovarianceStamped or '
+        'TwistStamped.', choices=TWIST_TYPES)
     use_aux_velocity: bool = param(
         False, 'Subscribe to `aux_velocity` (velocity against a target at rest, ENU).', live=True)
     aux_velocity_type: str = param(

@@ -18,6 +18,7 @@ from ekf_fusion_ros.params.health import HealthParams
 from ekf_fusion_ros.params.lpe import LpeParams
 from ekf_fusion_ros.params.messages import MessageParams
 from ekf_fusion_ros.params.node import NodeParams
+from ekf_fusion_ros.params.receivers import ReceiversParams
 from ekf_fusion_ros.params.session import SessionParams
 from ekf_fusion_ros.params.spec import leaves
 from ekf_fusion_ros.params.spec import param
@@ -40,6 +41,7 @@ class Params:
     lpe: LpeParams = field(default_factory=LpeParams)
     messages: MessageParams = field(default_factory=MessageParams)
     session: SessionParams = field(default_factory=SessionParams)
+    receivers: ReceiversParams = field(default_factory=ReceiversParams)
     health: HealthParams = field(default_factory=HealthParams)
     two_topic: TwoTopicParams = field(default_factory=TwoTopicParams)
     node: NodeParams = field(default_factory=NodeParams)

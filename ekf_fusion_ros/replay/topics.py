@@ -30,6 +30,9 @@ TYPES: dict[str, tuple[str, ...]] = {
         'sensor_msgs/msg/Imu'),
     roles.AUX_VELOCITY: (
         'geometry_msgs/msg/TwistWithCovarianceStamped', 'geometry_msgs/msg/TwistStamped'),
+    roles.FIX_2: ('sensor_msgs/msg/NavSatFix',),
+    roles.FIX_VELOCITY_2: (
+        'geometry_msgs/msg/TwistWithCovarianceStamped', 'geometry_msgs/msg/TwistStamped'),
 }
 ALL_TYPES = frozenset(kind for kinds in TYPES.values() for kind in kinds)
 WITH_ODOMETRY = (roles.ODOMETRY, roles.FIX)
@@ -38,6 +41,7 @@ WITHOUT_ODOMETRY = (
 # A twist may as well be a command, a truth value may mean anything: the name must tell.
 NAMES = {
     roles.FIX_VELOCITY: ('fix', 'gps', 'gnss', 'navsat'),
+    roles.FIX_VELOCITY_2: ('fix', 'gps', 'gnss', 'navsat'),
     roles.FLOW: ('flow',),
     roles.AIRSPEED: ('airspeed', 'air_speed', 'pitot'),
     roles.LANDED: ('landed', 'on_ground', 'ground_contact'),
@@ -83,10 +87,12 @@ def choose(
         roles.ODOMETRY not in wanted and bool(candidates[roles.ODOMETRY]))
     usual = WITH_ODOMETRY if has_odometry else WITHOUT_ODOMETRY
     for role in (*usual, *switched_on):
-        if role not in wanted and candidates[role]:
-            choice.topics[role] = candidates[role][0]
-    for role in roles.PARTS_OF_FIX:
-        if roles.FIX not in choice.topics and role not in wanted:
+        taken = [topic.name for topic in choice.topics.values()]
+        free = [topic for topic in candidates[role] if topic.name not in taken]
+        if role not in wanted and free:
+            choice.topics[role] = free[0]
+    for role, fix in ((roles.FIX_2, roles.FIX), *roles.FIX_OF_PART.items()):
+        if fix not in choice.topics and role not in wanted:
             choice.topics.pop(role, None)
     choice.topics = {role: choice.topics[role] for role in TYPES if role in choice.topics}
     _remark(choice, available, wanted)
@@ -147,4 +153,12 @@ def _remark(choice: Choice, available: Mapping[str, Topic], wanted: Mapping[str,
             choice.remarks.append(f'left out as asked: {topic.name} ({topic.type})')
         else:
             choice.remarks.append(f'left out: {topic.name} ({topic.type}); {verb} with '
-                                  f'--topic {role}={topic.name}')
+                                  f'--topic {role}={topic.name}{_beside(role, topic, choice)}')
+
+
+def _beside(role: str, topic: Topic, choice: Choice) -> str:
+    """Say how a topic of a second receiver joins the first."""
+    second = {roles.FIX: roles.FIX_2, roles.FIX_VELOCITY: roles.FIX_VELOCITY_2}.get(role)
+    if role not in choice.topics or second is None or second in choice.topics:
+        return ''
+    return f', beside it with --topic {second}={topic.name}'

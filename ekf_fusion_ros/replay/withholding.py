@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from collections.abc import Sequence
 
-from ekf_fusion_ros.roles import FIX
-from ekf_fusion_ros.roles import PARTS_OF_FIX
+from ekf_fusion_ros.roles import FIX_OF_PART
 
 Window = tuple[float, float]
 
@@ -19,9 +18,9 @@ class Withholding:
             role: [(start_us + round(1e6 * first), start_us + round(1e6 * end))
                    for first, end in pairs]
             for role, pairs in windows.items()}
-        if FIX in self._windows:
-            for role in PARTS_OF_FIX:
-                self._windows[role] = self._windows.get(role, []) + self._windows[FIX]
+        for role, fix in FIX_OF_PART.items():
+            if fix in self._windows:
+                self._windows[role] = self._windows.get(role, []) + self._windows[fix]
         self.roles = frozenset(self._windows)
 
     def holds(self, role: str, time_us: int) -> bool:

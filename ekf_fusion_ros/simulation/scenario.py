@@ -35,6 +35,7 @@ ORIGIN = GeoPoint(47.397742, 8.545594, 488.0)
 START_US = 1_700_000_000_000_000
 ROLES = ('odometry', 'fix', 'imu', 'magnetic_field', 'pressure')
 FURTHER_ROLES = ('range', 'flow', 'airspeed', 'landed', 'aux_velocity', 'armed')
+FURTHER_RECEIVERS = ('fix_2',)
 ARMED_AT = 15.0
 """Time in s at which a simulated vehicle is armed: the estimate has settled by then."""
 
@@ -42,7 +43,8 @@ GPS_HEADING = 'gps_heading'
 """No sensor of its own: a receiver with two antennas tells it with the fix."""
 
 # Each role keeps its random numbers whatever roles are added to the lists.
-STREAMS = {role: number for first, roles in ((0, ROLES), (100, FURTHER_ROLES))
+STREAMS = {role: number for first, roles in (
+    (0, ROLES), (100, FURTHER_ROLES), (200, FURTHER_RECEIVERS))
            for number, role in enumerate(roles, first)}
 
 
@@ -106,6 +108,7 @@ def default_sensors(
         'landed': GroundContact(),
         'aux_velocity': AuxiliaryVelocity(),
         'armed': Arming(armed_at=ARMED_AT),
+        'fix_2': Gnss(origin=origin),
     }
     return {role: everything[role] for role in roles if role != GPS_HEADING}
 

@@ -105,6 +105,17 @@ def test_what_cannot_be_chosen(wanted, words):
         choose(available, **wanted)
 
 
+def test_a_second_receiver_is_offered_and_never_plays_both_roles():
+    two = recording(('/odom', ODOM, 90), ('/left/fix', FIX, 9), ('/right/fix', FIX, 8))
+    line, = [line for line in choose(two).lines() if 'left out' in line]
+    assert line.endswith('beside it with --topic fix_2=/right/fix')
+    assert names(choose(two, fix_2='/left/fix'))['fix'] == '/right/fix'
+    choice = topics.choose(two, {}, 'flight', ('fix_2',))
+    assert names(choice) == {'odometry': '/odom', 'fix': '/left/fix', 'fix_2': '/right/fix'}
+    one = recording(('/odom', ODOM, 90), ('/fix', FIX, 9))
+    assert 'fix_2' not in names(topics.choose(one, {}, 'flight', ('fix_2',)))
+
+
 def test_a_recording_of_nothing_useful():
     with pytest.raises(storage.RecordingError, match='/camera'):
         choose(recording(('/camera', 'sensor_msgs/msg/Image', 5)))

@@ -22,3 +22,10 @@ def test_fix_takes_its_velocity_along_and_not_the_other_way():
     assert windows.holds('gps_heading', START + 1_500_000)
     assert windows.holds('fix_velocity', START + 8_500_000)
     assert not windows.holds('fix', START + 8_500_000)
+
+
+def test_each_receiver_is_withheld_by_itself():
+    windows = Withholding({'fix_2': [(1.0, 2.0)]}, START)
+    inside = START + 1_500_000
+    assert windows.holds('fix_2', inside) and windows.holds('fix_velocity_2', inside)
+    assert not windows.holds('fix', inside) and not windows.holds('fix_velocity', inside)

@@ -70,6 +70,8 @@ def test_mounting_of_the_messages_becomes_the_lever_arm():
     (('imu', 'fix_velocity'), 'needs a fix'),
     (('imu', 'gps_heading'), 'needs a fix'),
     (('imu', 'gyroscope'), 'unknown role'),
+    (('imu', 'fix_2'), 'role fix_2 needs a fix topic'),
+    (('imu', 'fix', 'fix_velocity_2'), 'role fix_velocity_2 needs a fix_2 topic'),
 ])
 def test_roles_that_cannot_be_fused(roles, word):
     with pytest.raises(ValueError, match=word):
@@ -111,3 +113,9 @@ def test_fix_older_than_the_horizon_can_take_is_refused():
     assert age_limit_us(params, 'fix') == 170_000
     late = configure(with_overrides(Params(), {'session.horizon_ms': 700.0}), {'odometry', 'fix'})
     assert age_limit_us(late, 'fix') == 500_000
+
+
+def test_the_horizon_lies_behind_the_delay_of_a_second_receiver():
+    params = with_overrides(Params(), {'receivers.fix_2.delay_ms': 400.0})
+    assert configure(params, ('imu', 'fix')).ekf2.timing.horizon_min_ms == 200.0
+    assert configure(params, ('imu', 'fix', 'fix_2')).ekf2.timing.horizon_min_ms == 440.0

@@ -1,0 +1,153 @@
+"""Two receivers in flight against the truth: the blend, hand-over, bias, rates, loss."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+
+import numpy as np
+import pytest
+from receivers.flight import fly
+from receivers.flight import moved
+from receivers.flight import receiver
+
+from ekf_fusion_ros.samples import NAN3
+
+METRE = 1.0 / 111_200.0
+BETTER = receiver(pos_noise=1.0, pos_correlated=0.5)
+WORSE = receiver(pos_noise=1.6, pos_correlated=0.8)
+QUIET = receiver(pos_noise=0.05, pos_correlated=0.0)
+SETTLED, OFF, ON = 25.0, 50.0, 65.0
+STEP = 0.3
+SEEDS = range(4)
+
+
+def between(first, end, change):
+    """Return what changes fixes inside a window and keeps the others."""
+    return lambda t, fix: change(fix) if first <= t < end else fix
+
+
+def dropped(_):
+    return None
+
+
+def biased(fix):
+    return replace(fix, lat=fix.lat + 20.0 * METRE)
+
+
+def shifted(metres):
+    return lambda _, fix: replace(fix, lat=fix.lat + metres * METRE)
+
+
+@pytest.fixture(scope='module')
+def flights():
+    return {seed: fly({'fix': BETTER, 'fix_2': WORSE}, seed) for seed in SEEDS}
+
+
+def test_the_blend_beats_the_better_receiver(flights):
+    """In the fixes that the filter gets and in its output, over seeds and nearly in each."""
+    alone = {seed: fly({'fix': BETTER}, seed) for seed in SEEDS}
+    output = [(flights[seed].rms(SETTLED), alone[seed].rms(SETTLED)) for seed in SEEDS]
+    fixes = [(flights[seed].blend_rms(SETTLED, 0.11), alone[seed].blend_rms(SETTLED, 0.11))
+             for seed in SEEDS]
+    for pairs in (output, fixes):
+        both, better = np.sqrt(np.mean(np.square(pairs), axis=0))
+        assert both < 0.9 * better
+        assert sum(one < other for one, other in pairs) >= len(SEEDS) - 1
+
+
+@pytest.mark.parametrize('role', ['fix', 'fix_2'])
+@pytest.mark.parametrize('change', [dropped, biased])
+def test_no_step_where_one_goes_comes_back_or_lies(flights, role, change):
+    """At each switch; later the outputs differ by the noise of the receiver that is left."""
+    for seed in SEEDS:
+        flown = fly({'fix': BETTER, 'fix_2': WORSE}, seed, {role: between(OFF, ON, change)})
+        for switch in (OFF, ON):
+            near = np.abs(flown.time - switch - 0.5) < 0.5
+            same = np.abs(flights[seed].time - switch - 0.5) < 0.5
+            gap = flown.position[near, 0:2] - flights[seed].position[same, 0:2]
+            change_of_gap = np.linalg.norm(gap - gap[0], axis=1).max()
+            assert change_of_gap < STEP
+
+
+@pytest.mark.parametrize('role', ['fix', 'fix_2'])
+@pytest.mark.parametrize('change', [dropped, biased])
+def test_receivers_that_disagree_hand_over_slowly(role, change):
+    """Of two without noise, 1.5 m apart, either may go or lie: the output stays."""
+    quiet, apart = {'fix': QUIET, 'fix_2': QUIET}, {'fix_2': shifted(1.5)}
+    flown = fly(quiet, 0, apart)
+    window = between(OFF, ON, change)
+    both = {**apart, role: lambda t, fix: (
+        apart.get(role, lambda _, same: same)(t, window(t, fix)) if window(t, fix) else None)}
+    assert moved(flown, fly(quiet, 0, both), SETTLED) < STEP
+    between_both = flown.error[flown.time > SETTLED, 0].mean()
+    assert between_both == pytest.approx(0.75, abs=0.1)
+
+
+def test_a_lie_is_told_and_excluded_until_it_ends():
+    flown = fly({'fix': BETTER, 'fix_2': WORSE}, 0, {'fix_2': between(OFF, ON, biased)})
+    told = [text for text in flown.events if text.startswith('fix_2')]
+    assert len(told) == 3
+    assert told[1].startswith('fix_2: position excluded, ')
+    assert told[2] == 'fix_2: position agrees again, admitted'
+
+
+def test_a_lie_from_the_start_does_not_place_the_vehicle():
+    """Without a prediction the receiver that claims to be better decides."""
+    flown = fly({'fix': WORSE, 'fix_2': BETTER}, 0, {'fix': lambda _, fix: biased(fix)})
+    assert np.abs(flown.error[flown.time > SETTLED]).max() < 3.5
+
+
+def test_rates_delays_and_antennas_of_their_own():
+    """A slow late receiver on a boom with a quick one: as good as both on the same terms."""
+    slow = receiver(pos_noise=0.05, pos_correlated=0.0, rate=1.0, phase=0.37, stamp_delay=0.2,
+                    lever_arm=(-0.6, 0.8, -1.0))
+    quick = replace(QUIET, rate=10.0, lever_arm=(1.0, 0.0, -0.5))
+    own = {'receivers.fix_2.delay_ms': 200.0, 'messages.fix_2.mount_xyz': '-0.6, -0.8, 1.0',
+           'messages.fix.mount_xyz': '1.0, 0.0, 0.5'}
+    flown = fly({'fix': quick, 'fix_2': slow}, overrides=own)
+    plain = fly({'fix': QUIET, 'fix_2': QUIET})
+    assert flown.rms(SETTLED) < plain.rms(SETTLED) + 0.05
+    offset = [status.offset for status in flown.session.receivers()]
+    np.testing.assert_allclose(offset, 0.0, atol=0.1)
+    wrong = fly({'fix': quick, 'fix_2': slow}, overrides={
+        name: value for name, value in own.items() if 'fix_2' not in name})
+    assert flown.rms(SETTLED) < wrong.rms(SETTLED)
+
+
+def test_velocity_of_one_alone_is_the_velocity_of_the_blend():
+    flown = fly({'fix': replace(BETTER, has_velocity=False), 'fix_2': WORSE})
+    weights = [status.weights[2] for status in flown.session.receivers()]
+    assert weights == [0.0, 1.0]
+    assert flown.session.receivers()[0].obstacles == {'velocity': 'not measured'}
+    assert all(fix.has_velocity for fix in flown.fixes[5:-5])
+    assert flown.rms(SETTLED) < fly(
+        {'fix': replace(BETTER, has_velocity=False)}).rms(SETTLED)
+
+
+def test_loss_of_both_and_return():
+    window = between(OFF, ON, dropped)
+    flown = fly({'fix': BETTER, 'fix_2': WORSE}, 0, {'fix': window, 'fix_2': window})
+    told = [text for text in flown.events if 'receiver is' in text]
+    assert len(told) == 6 and sum('silent' in text for text in told) == 2
+    assert not [fix for fix in flown.fixes if math.isnan(fix.lat)]
+    assert flown.rms(ON + 15.0) < 2.0
+
+
+def test_a_second_receiver_that_never_speaks_changes_nothing():
+    alone = fly({'fix': BETTER})
+    silent = fly({'fix': BETTER, 'fix_2': WORSE}, 0, {'fix_2': lambda t, fix: None})
+    np.testing.assert_allclose(silent.position, alone.position, atol=1e-6)
+
+
+def test_the_first_may_be_silent():
+    flown = fly({'fix': BETTER, 'fix_2': WORSE}, 0, {'fix': lambda t, fix: None})
+    assert flown.rms(SETTLED) < 2.0
+    assert flown.session.waiting_role == ''
+
+
+def test_a_velocity_may_be_missing_at_times():
+    flown = fly({'fix': BETTER, 'fix_2': WORSE}, 0, {
+        'fix': lambda t, fix: replace(fix, velocity=NAN3, sacc=math.nan)
+        if round(5 * t) % 3 == 0 else fix})
+    assert flown.rms(SETTLED) < 1.5
