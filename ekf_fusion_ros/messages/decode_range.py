@@ -33,9 +33,8 @@ def decode_range(message: Any, params: MessageParams) -> RangeSample:
     flat = message if isinstance(message, FlatMessage) else _flat(message)
     time_us = checked_stamp(flat.sec, flat.nanosec)
     low, high = _limits(flat.numbers[LIMITS], params.range)
-    fields.check_variances((*flat.numbers[VARIANCE:], 0.0), (0,), 'variance')
     distance = float(flat.numbers[DISTANCE])
-    variance = float((*flat.numbers[VARIANCE:], 0.0)[0])
+    variance = _variance(flat.numbers)
     ultrasound = int(flat.numbers[KIND]) == ULTRASOUND
     if math.isinf(distance):
         return RangeSample(time_us, high if distance > 0.0 else low, NO_DISTANCE, low, high,
@@ -44,6 +43,13 @@ def decode_range(message: Any, params: MessageParams) -> RangeSample:
     if distance < 0.0:
         raise Refused('negative_range', f'range is {distance:g} m: too close is -inf by REP-117')
     return RangeSample(time_us, distance, UNKNOWN_QUALITY, low, high, variance, ultrasound)
+
+
+def _variance(numbers: Sequence[float]) -> float:
+    """Return the variance in m^2; 0, unknown, where it is infinite or the message has none."""
+    told = (*numbers[VARIANCE:], 0.0)
+    fields.check_variances(told, (0,), 'variance')
+    return 0.0 if math.isinf(told[0]) else float(told[0])
 
 
 def _limits(told: Sequence[float], params: RangeMessageParams) -> tuple[float, float]:

@@ -71,7 +71,9 @@ def test_quaternion_of_a_matrix_pivots_on_a_positive_component(q):
     if scipy_rotation(q).as_matrix().trace() > 0.0:
         assert found[0] > 0.0
     else:
-        assert found[1 + np.argmax(np.abs(found[1:4]))] > 0.0
+        # two may be as large
+        largest = np.abs(found[1:4]) > np.abs(found[1:4]).max() - 1e-9
+        assert found[1:4][largest].max() > 0.0
 
 
 @pytest.mark.parametrize('axis', range(3))
@@ -104,7 +106,9 @@ def test_euler_321(roll, pitch, yaw):
     np.testing.assert_allclose(matrix_from_euler_321(roll, pitch, yaw), expected.as_matrix(),
                                atol=1e-12)
     angles = euler_321(expected.as_matrix())
-    np.testing.assert_allclose(angles, expected.as_euler('ZYX')[::-1], atol=1e-6)
+    error = angles - expected.as_euler('ZYX')[::-1]
+    # half a turn has two names
+    np.testing.assert_allclose((error + math.pi) % (2.0 * math.pi), math.pi, atol=1e-6)
 
 
 @pytest.mark.parametrize('pitch', [0.5 * math.pi, -0.5 * math.pi])
