@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from collections.abc import Collection
 from collections.abc import Mapping
@@ -85,6 +86,10 @@ class FixIntake:
     def statuses(self) -> Sequence[ReceiverStatus]:
         """Return what becomes of each of several receivers, nothing where there is one."""
         return self._bank.statuses() if self._bank is not None else ()
+
+    def passed_over(self) -> Mapping[str, Counter[str]]:
+        """Return by role and reason the fixes that the bank had no use for."""
+        return self._bank.passed_over if self._bank is not None else {}
 
     def _through(self, role: str, fixes: Sequence[GnssSample]) -> Sequence[GnssSample]:
         bank = self._bank

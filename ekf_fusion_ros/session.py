@@ -512,6 +512,8 @@ class FusionSession:
             role = ROLE_OF_SAMPLE[kind]
             if now and role in self._statistics:
                 counts[role] = counts.get(role, Counter()) + Counter(now)
+        for role, passed_over in self._intake.passed_over().items():
+            counts[role] = counts.get(role, Counter()) + passed_over
         return counts
 
     def resets(self) -> dict[str, int]:

@@ -11,6 +11,7 @@ from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import HealthLevel
 from ekf_fusion_ros.live.output_watch import OutputWatch
 from ekf_fusion_ros.live.receiver_checks import receiver_report
+from ekf_fusion_ros.live.receiver_reports import receiver_status_report
 from ekf_fusion_ros.live.report import Report
 from ekf_fusion_ros.live.situation import PREPARING
 from ekf_fusion_ros.live.situation import situation
@@ -87,6 +88,7 @@ class Reporting:
         receiver = receiver_report(health.values)
         if receiver is not None and 'fix' in self._inputs.watches:
             reports.append(receiver)
+        reports += [receiver_status_report(one) for one in self._session.receivers()]
         reports += [further() for further in self.further]
         late = sum(one.refused.get(reason, 0) for one in counts.values() for reason in LATE)
         reports.append(self._work.report(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ekf_fusion_ros.buffer import OVERTAKEN
 from ekf_fusion_ros.estimator import Event
 from ekf_fusion_ros.estimator import NavState
 from ekf_fusion_ros.params.receivers import ReceiversParams
@@ -29,6 +31,7 @@ Array = NDArray[np.float64]
 POSITION, HEIGHT, VELOCITY = range(len(KINDS))
 KINDS_WITH_OFFSET = (POSITION, HEIGHT)
 UNKNOWN_HEIGHT_EPV = 1e3
+LEFT_OUT = 'left_out_of_blend'
 EPOCH_INTERVAL_US = 40_000
 """Fixes closer together than this belong to one epoch: the filter takes none so close."""
 
@@ -91,6 +94,8 @@ class ReceiverBank:
         self._offsets = {kind: Offsets(PARTS[kind].stop - PARTS[kind].start, params.offset_time,
                                        params.handover_time) for kind in KINDS_WITH_OFFSET}
         self._events: list[Event] = []
+        self.passed_over: dict[str, Counter[str]] = {name: Counter() for name in receivers}
+        """Fixes that went into no blended position, by receiver and reason."""
 
     @property
     def waiting(self) -> bool:
@@ -103,11 +108,19 @@ class ReceiverBank:
         if own_delay_us != self._delay_us:
             fix = replace(fix, time_us=fix.time_us - own_delay_us + self._delay_us)
         self._note_arrival(name, fix.time_us)
-        blended = self._close() if name in self._epoch and not self._is_late(name) else []
+        blended: list[GnssSample] = []
+        if name in self._epoch and not self._is_late(name):
+            blended = self._close()
+        self._give_up(name)
         self._epoch[name] = fix
         complete = not any(name not in self._epoch or self._is_late(name)
                            for name in self._newest_us)
         return blended + (self._close() if complete else [])
+
+    def _give_up(self, name: str) -> None:
+        """Drop a late fix that was still alone when the next one came."""
+        if self._epoch.pop(name, None) is not None:
+            self.passed_over[name][OVERTAKEN] += 1
 
     def _note_arrival(self, name: str, time_us: int) -> None:
         if not self._present:
@@ -127,7 +140,7 @@ class ReceiverBank:
             if now_us - newest_us > self._timeout_us:
                 del self._newest_us[name]
                 self._readings.pop(name, None)
-                self._epoch.pop(name, None)
+                self._give_up(name)
                 self._present.discard(name)
                 self._events.append(Event(
                     now_us, f'{name}: the receiver is silent, no fix for '
@@ -137,7 +150,10 @@ class ReceiverBank:
 
     def flush(self) -> list[GnssSample]:
         """Give up waiting."""
-        return self._close()
+        blended = self._close()
+        for name in list(self._epoch):
+            self._give_up(name)
+        return blended
 
     def drain_events(self) -> list[Event]:
         """Return and forget who came, went, was excluded and admitted."""
@@ -185,6 +201,8 @@ class ReceiverBank:
         self, names: list[str], prediction: Prediction, time_us: int) -> GnssSample | None:
         """Return the mean of the readings, None where the position of none is usable."""
         shares = [self._shares(kind, names) for kind in range(len(KINDS))]
+        for name in names:
+            self.passed_over[name][LEFT_OUT] += name not in shares[POSITION]
         if not shares[POSITION]:
             return None
         arms = Antenna(*(sum((share * self._receivers[name].antenna

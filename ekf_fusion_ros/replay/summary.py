@@ -13,6 +13,8 @@ from ekf_fusion_ros.estimator import AidStatus
 from ekf_fusion_ros.health.home import Home
 from ekf_fusion_ros.health.status import NavigationStatus
 from ekf_fusion_ros.messages.encode_home import encode_home
+from ekf_fusion_ros.receivers.bank import ReceiverStatus
+from ekf_fusion_ros.receivers.reading import KINDS
 from ekf_fusion_ros.replay.options import ReplayOptions
 from ekf_fusion_ros.replay.topics import Choice
 from ekf_fusion_ros.session import FusionSession
@@ -54,6 +56,7 @@ def _content(
         'aid_sources': {aid.name: _aid(aid) for aid in session.estimator.aid_statuses()},
         'events': [{'time': event.time_us / SECOND_US, 'text': event.text}
                    for event in progress.events],
+        'receivers': {one.name: _receiver(one) for one in session.receivers()},
         'resets': dict(session.resets()),
         'alignment': {name: time_us / SECOND_US for name, time_us in session.milestones.items()},
         'first_output': _seconds(progress.first_output_us),
@@ -105,6 +108,16 @@ def _topics(session: FusionSession, choice: Choice) -> dict[str, Any]:
         about = {'role': role} | ({} if chosen is None else {'type': chosen.type})
         topics[name] = about | statistics.as_dict()
     return topics
+
+
+def _receiver(status: ReceiverStatus) -> dict[str, Any]:
+    """Return what became of one of several receivers, at the end of the recording."""
+    return {
+        'live': status.live,
+        'weights': dict(zip(KINDS, status.weights, strict=True)),
+        'offset': dict(zip(('north', 'east', 'down'), status.offset, strict=True)),
+        'obstacles': dict(status.obstacles),
+    }
 
 
 def _aid(aid: AidStatus) -> dict[str, Any]:

@@ -90,6 +90,10 @@ def test_a_lie_is_told_and_excluded_until_it_ends():
     assert len(told) == 3
     assert told[1].startswith('fix_2: position excluded, ')
     assert told[2] == 'fix_2: position agrees again, admitted'
+    counts = flown.session.statistics()
+    # 15 s of lie and 5 s of probation at 5 Hz; the other loses none.
+    assert counts['fix_2'].passed_over['left_out_of_blend'] == pytest.approx(100, abs=3)
+    assert counts['fix'].passed_over['left_out_of_blend'] == 0
 
 
 def test_a_lie_from_the_start_does_not_place_the_vehicle():
