@@ -42,20 +42,22 @@ GPS_AND_ALL_ELSE = 15
 UNMEASURED = 1e6
 INFRARED = 1
 BEST_FLOW = 255.0
+SUFFIXES = {'fix_2': '_2'}
 
 
 def write_recording(path: Path, arrivals: Iterable[tuple[int, str, Sample]]) -> dict[str, int]:
     """Write samples to a new rosbag2 folder (MCAP); return the messages per topic.
 
-    arrivals: log time in us, role (not used), sample. Raises WriterError where the folder exists.
+    arrivals: log time in us, role, sample. The topics of a second receiver end in _2 as its role
+    does; of other samples the type says the topic. Raises WriterError where the folder exists.
     """
     store = get_typestore(Stores.ROS2_JAZZY)
     messages = _Messages(store.types)
     counts: dict[str, int] = {}
     connections: dict[str, Any] = {}
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
-        for time_us, _, sample in arrivals:
-            for topic, message in messages.of(sample):
+        for time_us, role, sample in arrivals:
+            for topic, message in messages.of(sample, SUFFIXES.get(role, '')):
                 kind = message.__msgtype__
                 if topic not in connections:
                     connections[topic] = bag.add_connection(topic, kind, typestore=store)
@@ -84,16 +86,16 @@ class _Messages:
             AuxVelocitySample: ('/aux_velocity', self._aux_velocity),
         }
 
-    def of(self, sample: Sample) -> Iterator[tuple[str, Any]]:
-        """Yield topic and message of a sample; a fix may have several."""
+    def of(self, sample: Sample, suffix: str) -> Iterator[tuple[str, Any]]:
+        """Yield topic, with a suffix, and message of a sample; a fix may have several."""
         if type(sample) not in self._of:
             raise TypeError(f'{type(sample).__name__} has no ROS message here')
         topic, make = self._of[type(sample)]
-        yield topic, make(sample)
+        yield topic + suffix, make(sample)
         if isinstance(sample, GnssSample) and sample.has_velocity:
-            yield '/fix_velocity', self._fix_velocity(sample)
+            yield '/fix_velocity' + suffix, self._fix_velocity(sample)
         if isinstance(sample, GnssSample) and math.isfinite(sample.yaw):
-            yield '/gps_heading', self._gps_heading(sample)
+            yield '/gps_heading' + suffix, self._gps_heading(sample)
 
     def _make(self, kind: str, **fields: Any) -> Any:
         package, name = kind.split('/')

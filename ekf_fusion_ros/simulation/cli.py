@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 import sys
 
+from ekf_fusion_ros.simulation.scenario import FURTHER_RECEIVERS
 from ekf_fusion_ros.simulation.scenario import FURTHER_ROLES
 from ekf_fusion_ros.simulation.scenario import GPS_HEADING
 from ekf_fusion_ros.simulation.scenario import ROLES
@@ -34,7 +35,7 @@ TRAJECTORIES: Mapping[str, Callable[[float], Trajectory]] = {
     'flight': lambda duration: Flight(duration=duration),
     'loiter': lambda duration: Loiter(duration=duration),
 }
-KNOWN_ROLES = (*ROLES, *FURTHER_ROLES, GPS_HEADING)
+KNOWN_ROLES = (*ROLES, *FURTHER_ROLES, GPS_HEADING, *FURTHER_RECEIVERS)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
