@@ -28,6 +28,7 @@ from ekf_fusion_ros.simulation.trajectory import Hover
 
 ROLES = ('imu', 'fix', 'magnetic_field', 'pressure', 'landed')
 REST = Hover(duration=40.0)
+ASIDE = np.array((2.0, 0.0, 0.0))
 EIGHT = FigureOfEight(duration=90.0)
 
 pytestmark = pytest.mark.parametrize('name', ESTIMATORS)
@@ -197,7 +198,7 @@ def test_the_origin_moves_under_a_vehicle_that_stays(name):
     after = run.nav
     assert after.origin == moved
     np.testing.assert_allclose(
-        after.position, before.position + (30.0, -40.0, 12.0), atol=0.02)
+        after.position, before.position + np.array((30.0, -40.0, 12.0)), atol=0.02)
     assert not estimator.set_origin(GeoPoint(95.0, 0.0, 0.0))
 
 
@@ -219,10 +220,10 @@ def test_a_pose_that_is_given_is_taken(name):
     run = Run(name, REST)
     before = run.nav
     yaw = yaw_of(matrix_from_quat(before.quaternion)) + 0.3
-    pose = GivenPose(before.position + (2.0, 0.0, 0.0), np.array((0.04, 0.04, 0.0)), yaw, 0.01)
+    pose = GivenPose(before.position + ASIDE, np.array((0.04, 0.04, 0.0)), yaw, 0.01)
     assert run.session.estimator.set_pose(pose)
     after = run.nav
-    np.testing.assert_allclose(after.position, before.position + (2.0, 0.0, 0.0), atol=0.05)
+    np.testing.assert_allclose(after.position, before.position + ASIDE, atol=0.05)
     assert yaw_of(matrix_from_quat(after.quaternion)) == pytest.approx(yaw, abs=0.02)
     assert after.yaw_jump - before.yaw_jump == pytest.approx(0.3, abs=0.02)
     assert after.pose_cov[0, 0] == pytest.approx(0.04, rel=0.2)
