@@ -137,8 +137,10 @@ def _wanted(params: Params, roles: Collection[str]) -> dict[str, dict[str, Any]]
 def _wanted_of_lpe(params: Params, roles: Collection[str]) -> dict[str, dict[str, Any]]:
     """Return the values of lpe that these roles call for."""
     own_frame = FIX not in roles or has_true_heading(params.messages.odometry)
+    x, y, z = params.messages.fix.mount_xyz
     wanted: dict[str, dict[str, Any]] = {
-        'gnss': {'enabled': FIX in roles}, 'flow': {'enabled': FLOW in roles}}
+        'gnss': {'enabled': FIX in roles, 'position': (x, -y, -z)},
+        'flow': {'enabled': FLOW in roles}}
     if ODOMETRY in roles:
         wanted['attitude'] = {'odometry_yaw': own_frame}
         wanted['vision'] = {

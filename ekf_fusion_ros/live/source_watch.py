@@ -19,17 +19,17 @@ EXPECTED_REASONS = (BELOW_THRESHOLD,)
 
 AIDS = {
     'odometry': ('vision_position', 'vision_height', 'vision_velocity',
-                 'vision_vertical_velocity'),
-    'fix': ('gnss_position', 'gnss_height'),
+                 'vision_vertical_velocity', 'vision', 'mocap'),
+    'fix': ('gnss_position', 'gnss_height', 'gnss'),
     'fix_velocity': ('gnss_velocity', 'gnss_vertical_velocity'),
     'magnetic_field': ('magnetic_field', 'declination'),
-    'pressure': ('baro_height',),
-    'range': ('range_height', 'height_above_ground'),
+    'pressure': ('baro_height', 'baro'),
+    'range': ('range_height', 'height_above_ground', 'lidar', 'sonar'),
     'flow': ('optical_flow',),
     'airspeed': ('airspeed',),
-    'aux_velocity': ('auxiliary_velocity',),
+    'aux_velocity': ('auxiliary_velocity', 'landing_target'),
 }
-"""Kinds of observation that come of a role."""
+"""Kinds of observation that come of a role, in EKF2 and in LPE."""
 
 RATE_WINDOW_S = 5.0
 SILENCE_S = 1.5

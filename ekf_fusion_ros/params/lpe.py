@@ -7,6 +7,8 @@ from dataclasses import field
 
 from ekf_fusion_ros.params.spec import param
 
+Vector = tuple[float, float, float]
+ZERO: Vector = (0.0, 0.0, 0.0)
 ATTITUDE_SOURCES = ('auto', 'imu', 'odometry', 'filter')
 VISION_KINDS = ('vision', 'mocap')
 
@@ -112,6 +114,9 @@ class GnssParams:
                            min=0.1, max=100, px4='LPE_EPH_MAX', live=True)
     epv_max: float = param(5.0, 'Largest vertical accuracy of fixes that start GNSS.', unit='m',
                            min=0.1, max=1000, px4='LPE_EPV_MAX', live=True)
+    position: Vector = param(
+        ZERO, 'Antenna position in the body frame (FRD). PX4 takes it to be in the body origin.',
+        unit='m')
     projection: str = param('wgs84', 'Ellipsoid, or the sphere of 6371 km that PX4 uses.',
                             choices=('wgs84', 'sphere'))
 

@@ -204,6 +204,15 @@ def test_the_state_of_its_time_is_what_a_fix_is_compared_with():
     assert innovation[0] == pytest.approx(0.02 * 10 * 0.2, abs=0.1)
 
 
+def test_the_fix_is_moved_from_the_antenna_to_the_body():
+    params = LpeParams()
+    half = math.sqrt(0.5)
+    east = np.array((half, 0.0, 0.0, half))
+    params = replace(params, gnss=replace(params.gnss, position=(1.0, 0.0, -0.5)))
+    bench = Bench(params, quaternion=east).run(3.0, fix()).run(20.0, fix(0.0, 1.0, -0.5))
+    assert bench.x[:3] == pytest.approx((0.0, 0.0, 0.0), abs=0.02)
+
+
 def test_fixes_too_late_are_counted():
     bench = Bench().run(3.0, fix())
     rate, make = fix()

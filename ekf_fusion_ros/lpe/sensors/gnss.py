@@ -6,6 +6,7 @@ import math
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ekf_fusion_ros.estimator import GeoPoint
 from ekf_fusion_ros.lpe.correction import Measurement
@@ -15,8 +16,11 @@ from ekf_fusion_ros.lpe.sensors.sensor import Sensor
 from ekf_fusion_ros.lpe.state import POSITION
 from ekf_fusion_ros.lpe.state import SECOND
 from ekf_fusion_ros.lpe.state import SIZE
+from ekf_fusion_ros.mathlib.rotation import cross
+from ekf_fusion_ros.samples import Antenna
 from ekf_fusion_ros.samples import GnssSample
 
+Array = NDArray[np.float64]
 C = np.eye(6, SIZE)
 LEAST_SATELLITES = 6
 FIX_3D = 3
@@ -85,11 +89,20 @@ class Gnss(Sensor):
             self.passed_over[TOO_LATE] += 1
             return None
         place = f.map.position_of(GeoPoint(measured.lat, measured.lon, measured.alt))
-        known = np.isfinite(np.concatenate((place, measured.velocity)))
-        y = np.concatenate((place, measured.velocity))[known]
-        return Measurement(y, C[known], self._variances(measured)[known], then)
+        y = np.concatenate((place, measured.velocity)) - self._antenna(measured)
+        known = np.isfinite(y)
+        return Measurement(y[known], C[known], self._variances(measured)[known], then)
 
-    def _variances(self, fix: GnssSample) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    def _antenna(self, fix: GnssSample) -> Array:
+        """Return position and velocity (6,) NED of the antenna against the body origin."""
+        attitude, arm = self._f.attitude, np.array(self._f.params.gnss.position)
+        antenna = fix.antenna or Antenna(arm, arm, arm)
+        position = attitude.rot @ antenna.position
+        position[2] = attitude.rot[2] @ antenna.height
+        velocity = attitude.rot @ cross(attitude.rate, antenna.velocity)
+        return np.concatenate((position, velocity))
+
+    def _variances(self, fix: GnssSample) -> Array:
         """Return what the fix states, but not less than the parameters, (6,)."""
         params = self._f.params.gnss
         sacc = fix.sacc if math.isfinite(fix.sacc) else 0.0
