@@ -12,7 +12,8 @@ from ekf_fusion_ros.params.spec import leaves
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md'))]
-NAME = re.compile(r'`((?:ekf2|session|node|messages|two_topic|health)\.[a-z0-9_.<>*]+)[`:= ]')
+GROUPS = 'ekf2|session|node|messages|two_topic|health|lpe|receivers'
+NAME = re.compile(rf'`((?:{GROUPS})\.[a-z0-9_.<>*]+)[`:= ]')
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
