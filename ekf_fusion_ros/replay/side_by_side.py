@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ekf_fusion_ros.geo.projection import make_projection
 from ekf_fusion_ros.params import with_overrides
 from ekf_fusion_ros.replay.options import ReplayOptions
 from ekf_fusion_ros.replay.runner import replay
@@ -63,7 +64,7 @@ def replay_side_by_side(
             # what it says of the recording holds for the others too
             for line in told:
                 say(line)
-    differences = _differences(options.output, names)
+    differences = _differences(options, summaries)
     for line in _table(summaries, differences):
         say(line)
     content = {'estimators': summaries, 'distance_between_tracks': differences}
@@ -87,17 +88,32 @@ def _table(
         for pair, found in differences.items())]
 
 
-def _differences(folder: Path, names: Sequence[str]) -> dict[str, dict[str, float]]:
-    """Return the horizontal distance between the first track and each other, m."""
-    tracks = {name: _track(folder / name / 'trajectory.csv') for name in names}
-    first = tracks[names[0]]
+def _differences(
+    options: ReplayOptions, summaries: Mapping[str, Mapping[str, Any]],
+) -> dict[str, dict[str, float]]:
+    """Return the horizontal distance on the earth between the first track and each other, m."""
+    first, *others = summaries
+    tracks = {name: _track(options.output / name / 'trajectory.csv') for name in summaries}
     found = {}
-    for name in names[1:]:
-        apart = _apart(first, tracks[name])
+    for name in others:
+        shift = _shift(options, summaries[first]['origin'], summaries[name]['origin'])
+        apart = _apart(tracks[first], tracks[name] + (0.0, *shift))
         if len(apart):
-            found[f'{names[0]}, {name}'] = {
+            found[f'{first}, {name}'] = {
                 'rms': float(np.sqrt(np.mean(apart ** 2))), 'largest': float(apart.max())}
     return found
+
+
+def _shift(
+    options: ReplayOptions, origin: Mapping[str, float] | None, other: Mapping[str, float] | None,
+) -> tuple[float, float]:
+    """Return east and north of another origin in m; each estimator places its own."""
+    if origin is None or other is None:
+        return 0.0, 0.0
+    north, east = make_projection(
+        options.params.ekf2.earth.projection, origin['lat'], origin['lon'], origin['alt'],
+    ).project(other['lat'], other['lon'])
+    return east, north
 
 
 def _track(path: Path) -> np.ndarray:

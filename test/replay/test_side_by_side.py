@@ -28,7 +28,11 @@ def options(tmp_path, monkeypatch):
         rows = ''.join(f'{t},{x},{y}\n' for t, x, y in TRACKS[name])
         (options.output / 'trajectory.csv').write_text('t,x,y\n' + rows)
         say(f'topics of {name}')
-        return {'start': 10.0, 'first_output': 12.5, 'rows': 2, 'resets': {'position_ne': 1},
+        # 3 m further north, of which the tracks of the two are apart
+        origin = {'lat': 47.0 + (3.0 / 111_180.0 if name == 'other' else 0.0), 'lon': 8.0,
+                  'alt': 0.0}
+        return {'origin': origin, 'start': 10.0, 'first_output': 12.5, 'rows': 2,
+                'resets': {'position_ne': 1},
                 'fix_distance': {'rms': 0.5, 'largest': 1.25}, 'cpu_seconds': 0.3,
                 'aid_sources': {'gnss_position': {'fused': 7, 'rejected': 1}}}
 
@@ -52,10 +56,11 @@ def test_the_table_has_a_column_for_each(options):
     head, first, *_ = said[1:]
     assert head.split() == ['ekf2', 'other']
     assert first.split()[-2:] == ['2.5', '2.5']
-    # over the time both have: 3 m at 1 s would be between two rows, 4 m at 2 s is a row
-    assert said[-1] == 'ekf2, other: tracks are 4.00 m RMS apart, at most 4.00 m'
+    # over the time both have: a row at 2 s, 4 m apart in numbers and 3 m by the origins
+    assert said[-1] == 'ekf2, other: tracks are 7.00 m RMS apart, at most 7.00 m'
     written = json.loads((made.output / 'comparison.json').read_text())
-    assert written['distance_between_tracks']['ekf2, other']['largest'] == 4.0
+    apart = written['distance_between_tracks']['ekf2, other']
+    assert apart['largest'] == pytest.approx(7.0, abs=1e-3)
     assert set(written['estimators']) == {'ekf2', 'other'}
 
 
