@@ -90,6 +90,7 @@ class ReceiverBank:
         self._present: set[str] = set()
         self._readings: dict[str, Reading] = {}
         self._last_us = 0
+        self._prediction: Prediction | None = None
         self._plausibility = Plausibility(params)
         self._offsets = {kind: Offsets(PARTS[kind].stop - PARTS[kind].start, params.offset_time,
                                        params.handover_time) for kind in KINDS_WITH_OFFSET}
@@ -180,15 +181,28 @@ class ReceiverBank:
         epoch, self._epoch = self._epoch, {}
         prediction = Prediction(
             self._state(), next(iter(epoch.values())), self._delay_us, self._projection)
+        self._follow_reset(prediction)
         for name, fix in epoch.items():
             self._readings[name] = Reading.of(fix, prediction.deviation(
                 fix, fix.time_us - self._delay_us, self._receivers[name].antenna))
-        news = self._plausibility.judge(self._readings, prediction, time_us)
+        news = self._plausibility.judge(self._readings, list(epoch), prediction, time_us)
         self._events += [Event(time_us, text) for text in news]
         if prediction.trusted:
             self._follow_offsets(epoch, time_us)
         blended = self._blend(list(epoch), prediction, time_us)
         return [] if blended is None else [blended]
+
+    def _follow_reset(self, prediction: Prediction) -> None:
+        """Compare what was measured before a reset of the estimate with the new estimate."""
+        before, self._prediction = self._prediction, prediction
+        step = np.zeros(6) if before is None else np.append(
+            -prediction.jump_since(before), np.zeros(3))
+        if step.any():
+            self._readings = {
+                name: replace(reading, deviation=reading.deviation + step)
+                for name, reading in self._readings.items()}
+            for kind, offsets in self._offsets.items():
+                offsets.move(step[PARTS[kind]])
 
     def _follow_offsets(self, names: Mapping[str, GnssSample], time_us: int) -> None:
         for kind, offsets in self._offsets.items():

@@ -55,6 +55,12 @@ class Offsets:
         mean = self._means.get(name)
         return np.zeros(self._size) if mean is None else mean.value - self._level
 
+    def move(self, step: Array) -> None:
+        """Take a reset of the prediction in, which moves all deviations (size,) alike."""
+        for mean in self._means.values():
+            mean.value = mean.value + step
+        self._level = self._level + step
+
     def update(
         self, deviations: Mapping[str, Array], weights: Mapping[str, float], time_us: int,
     ) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from collections.abc import Mapping
 
 import numpy as np
@@ -38,18 +39,23 @@ class Plausibility:
         return self._reasons.get((name, kind), '')
 
     def judge(
-        self, readings: Mapping[str, Reading], prediction: Prediction, time_us: int,
+        self, readings: Mapping[str, Reading], new: Collection[str], prediction: Prediction,
+        time_us: int,
     ) -> list[str]:
-        """Compare the newest readings; return in sentences who was excluded or admitted."""
+        """Judge the `new` readings by all newest ones; say who was excluded or admitted.
+
+        One from before is not judged again: the prediction may have been reset since.
+        """
         news: list[str] = []
         for kind in range(len(KINDS)):
             known = {name: reading for name, reading in readings.items() if reading.has(kind)}
             if len(known) < 2:
                 continue
             reference = self._reference(known, kind, prediction)
-            for name, reading in known.items():
-                deviation = float(np.linalg.norm(reading.deviation[PARTS[kind]] - reference))
-                limit = max(self._params.gate * reading.sigma[kind], self._smallest[kind])
+            for name in (name for name in new if name in known):
+                difference = known[name].deviation[PARTS[kind]] - reference
+                deviation = float(np.linalg.norm(difference))
+                limit = max(self._params.gate * known[name].sigma[kind], self._smallest[kind])
                 news += self._note(name, kind, deviation, limit, time_us)
         return news
 

@@ -21,6 +21,11 @@ from ekf_fusion_ros.samples import GnssSample
 Array = NDArray[np.float64]
 
 
+SHORT_US = 1_500_000
+RESET_DISTANCE = 5.0
+"""More than acceleration moves a vehicle within the interval of fixes, in m."""
+
+
 class Place(NamedTuple):
     """Position of an antenna on the earth (deg, deg, m) and its velocity NED (3,) m/s."""
 
@@ -79,6 +84,17 @@ class Prediction:
         return np.concatenate((
             position - self._antenna_position(time_us, arms),
             fix.velocity - self._antenna_velocity(arms) if fix.has_velocity else NAN3))
+
+    def jump_since(self, before: Prediction) -> Array:
+        """Return by how much (3,) NED in m the estimate was reset since; zero without a reset."""
+        elapsed_us = self._time_us - before._time_us
+        if not (self.trusted and before.trusted and self._origin == before._origin
+                and 0 <= elapsed_us <= SHORT_US):
+            return np.zeros(3)
+        jump = self._position - before._position - before._velocity * (1e-6 * elapsed_us)
+        size = np.array(2 * [np.linalg.norm(jump[0:2])] + [abs(jump[2])])
+        reset: Array = np.where(size > RESET_DISTANCE, jump, 0.0)
+        return reset
 
     def place(self, deviation: Array, time_us: int, arms: Antenna) -> Place:
         """Return the place at which a fix of time_us would deviate (6,) by so much."""

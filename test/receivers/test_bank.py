@@ -102,6 +102,19 @@ def test_all_alike_far_from_the_prediction_are_believed():
     assert north_of(fix) == pytest.approx(50.5, abs=0.01)
 
 
+def test_a_reset_of_the_estimate_between_two_fixes_excludes_nobody():
+    """The estimate was 30 m off when the first came and is right for the second."""
+    place = [np.array((-30.0, 0.0, 0.0))]
+    bank = bank_of(('a', 'b'), lambda: replace(standing(), position=place[0]), wait_ms=50.0)
+    bank.push('a', fix_at(1.0))
+    bank.advance(START + round(1.06e6))
+    place[0] = np.zeros(3)
+    bank.push('b', fix_at(1.1))
+    fix, = bank.advance(START + round(1.16e6))
+    assert north_of(fix) == pytest.approx(0.0, abs=1e-6)
+    assert not any('position' in status.obstacles for status in bank.statuses())
+
+
 @pytest.mark.parametrize(('deviation', 'excluded'), [(5.9, False), (6.1, True)])
 def test_the_gate(deviation, excluded):
     bank = bank_of(('a', 'b'), standing, gate=6.0, min_deviation=5.0)
