@@ -8,7 +8,6 @@ from typing import Any
 
 from geometry_msgs.msg import PoseStamped
 from rclpy.node import Node
-from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import NavSatFix
 from std_msgs.msg import Bool
 
@@ -19,6 +18,7 @@ from ekf_fusion_ros.live.report import Report
 from ekf_fusion_ros.messages.encode_home import HomeFields
 from ekf_fusion_ros.messages.encode_home import encode_home
 from ekf_fusion_ros.node.qos import latched_qos
+from ekf_fusion_ros.node.qos import make_publisher
 from ekf_fusion_ros.node.stamps import stamp_message
 from ekf_fusion_ros.params.tree import Params
 from ekf_fusion_ros.session import FusionSession
@@ -35,9 +35,7 @@ class NavigationPublisher:
 
     def __init__(self, node: Node, params: Params) -> None:
         def publisher(kind: type, topic: str) -> Any:
-            return node.create_publisher(
-                kind, topic, latched_qos(),
-                qos_overriding_options=QoSOverridingOptions.with_default_policies())
+            return make_publisher(node, kind, topic, latched_qos())
 
         self._frame = params.node.output_frame
         self._timeout = params.health.timeout

@@ -6,7 +6,6 @@ from typing import Any
 
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
-from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import NavSatFix
 
 from ekf_fusion_ros.fused_output import FusedOutput
@@ -16,8 +15,8 @@ from ekf_fusion_ros.messages.encode import OdometryFields
 from ekf_fusion_ros.messages.encode import encode_fix
 from ekf_fusion_ros.messages.encode import encode_gnss_odometry
 from ekf_fusion_ros.messages.encode import encode_odometry
+from ekf_fusion_ros.node.qos import make_publisher
 from ekf_fusion_ros.node.qos import output_qos
-from ekf_fusion_ros.node.qos import publisher_events
 from ekf_fusion_ros.node.stamps import stamp_message
 from ekf_fusion_ros.node.surroundings import SurroundingsPublisher
 from ekf_fusion_ros.params.tree import Params
@@ -28,10 +27,7 @@ class Publishers:
 
     def __init__(self, node: Node, params: Params) -> None:
         def publisher(kind: type, name: str) -> Any:
-            return node.create_publisher(
-                kind, name, output_qos(),
-                event_callbacks=publisher_events(node, node.resolve_topic_name(name)),
-                qos_overriding_options=QoSOverridingOptions.with_default_policies())
+            return make_publisher(node, kind, name, output_qos())
 
         self._params = params
         self._odometry = publisher(Odometry, 'odometry/filtered')

@@ -17,6 +17,7 @@ from rclpy.qos import HistoryPolicy
 from rclpy.qos import QoSProfile
 from rclpy.qos import ReliabilityPolicy
 from rclpy.qos import qos_policy_name_from_kind
+from rclpy.qos_overriding_options import QoSOverridingOptions
 
 SENSOR_DEPTH = 200
 IMU_DEPTH = 1000
@@ -46,6 +47,14 @@ def events_qos() -> QoSProfile:
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST, depth=EVENTS_DEPTH,
         reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def make_publisher(node: Node, kind: type, name: str, profile: QoSProfile) -> Any:
+    """Return a publisher whose quality parameters may override, and who tells of a mismatch."""
+    return node.create_publisher(
+        kind, name, profile,
+        event_callbacks=publisher_events(node, node.resolve_topic_name(name)),
+        qos_overriding_options=QoSOverridingOptions.with_default_policies())
 
 
 def subscription_events(node: Node, topic: str) -> SubscriptionEventCallbacks:

@@ -8,12 +8,12 @@ from geometry_msgs.msg import AccelWithCovarianceStamped
 from geometry_msgs.msg import PointStamped
 from geometry_msgs.msg import TwistWithCovarianceStamped
 from rclpy.node import Node
-from rclpy.qos_overriding_options import QoSOverridingOptions
 
 from ekf_fusion_ros.estimator import NavState
 from ekf_fusion_ros.messages.encode_surroundings import encode_acceleration
 from ekf_fusion_ros.messages.encode_surroundings import encode_ground
 from ekf_fusion_ros.messages.encode_surroundings import encode_wind
+from ekf_fusion_ros.node.qos import make_publisher
 from ekf_fusion_ros.node.qos import output_qos
 from ekf_fusion_ros.node.stamps import stamp_message
 from ekf_fusion_ros.params.tree import Params
@@ -24,9 +24,7 @@ class SurroundingsPublisher:
 
     def __init__(self, node: Node, params: Params) -> None:
         def publisher(kind: type, topic: str) -> Any:
-            return node.create_publisher(
-                kind, topic, output_qos(),
-                qos_overriding_options=QoSOverridingOptions.with_default_policies())
+            return make_publisher(node, kind, topic, output_qos())
 
         self._world = params.node.output_frame
         self._body = params.node.base_link_frame

@@ -21,7 +21,7 @@ from ekf_fusion_ros.messages.odometry_pose import odometry_pose
 from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.node.guard import Guard
 from ekf_fusion_ros.node.optional import imported
-from ekf_fusion_ros.node.publishers import stamp_message
+from ekf_fusion_ros.node.stamps import stamp_message
 from ekf_fusion_ros.params.messages import OdometryMessageParams
 from ekf_fusion_ros.params.node import NodeParams
 from ekf_fusion_ros.params.tree import Params

@@ -114,7 +114,8 @@ def test_further_roles_listen_to_the_message_that_is_chosen(start_fuser: StartFu
                  'airspeed: TwistStamped on /airspeed', 'landed: Bool on /landed',
                  'gps_heading: PoseStamped on /gps_heading'):
         assert line in fuser.output
-    unused = 'imu, fix_velocity, magnetic_field, pressure, armed, aux_velocity'
+    unused = ('imu, fix_velocity, magnetic_field, pressure, armed, aux_velocity, fix_2, '
+              'fix_velocity_2')
     assert f'not listening to {unused}:' in fuser.output
 
 
