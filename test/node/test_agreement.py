@@ -68,10 +68,11 @@ DEPTH = 10000
 
 @dataclass(frozen=True)
 class Play:
-    """A recording in stamp order and the topic of each role in use."""
+    """A recording in stamp order, the topic of each role in use, and the estimator."""
 
     path: Path
     topics: dict[str, str]
+    estimator: str = 'ekf2'
 
     def messages(self) -> Iterator[tuple[str, bytes]]:
         """Yield role and serialised message in the order of the log."""
@@ -114,7 +115,8 @@ def cut(source: Path, target: Path, topics: set[str], seconds: float) -> Path:
 def rows_of_replay(play: Play, folder: Path) -> dict[int, Array]:
     """Replay and return x, y, z, qx, qy, qz, qw, vx, vy, vz, yaw, 4 variances by stamp in us."""
     chosen = [f'--topic={role}={topic}' for role, topic in play.topics.items()]
-    arguments = [str(play.path), '--output', str(folder), '--rate', '0', '--no-bag', *chosen]
+    arguments = [str(play.path), '--output', str(folder), '--rate', '0', '--no-bag',
+                 '--estimator', play.estimator, *chosen]
     assert replay.main(arguments) == 0
     lines = (folder / 'trajectory.csv').read_text().splitlines()[1:]
     table = [line.split(',') for line in lines]
@@ -125,7 +127,7 @@ def rows_of_node(
     play: Play, start_fuser: StartFuser, peer: Peer, last_us: int,
 ) -> list[Odometry]:
     """Publish a recording into a node and return what it says, up to a stamp."""
-    parameters = {'node.publish_every_update': True}
+    parameters = {'node.publish_every_update': True, 'estimator': play.estimator}
     for role, topic in play.topics.items():
         parameters[f'node.use_{role}'] = True
         parameters[f'qos_overrides.{topic}.subscription.depth'] = DEPTH
@@ -200,6 +202,14 @@ def test_simulated_flight(
 ) -> None:
     roles = tuple(role for role in topics if role != 'fix_velocity')
     play = Play(simulated(tmp_path, roles, 25.0), topics)
+    rows = rows_of_replay(play, tmp_path / 'out')
+    assert len(rows) > 500
+    assert_same(rows, rows_of_node(play, start_fuser, peer, max(rows)))
+
+
+def test_the_other_estimator(tmp_path: Path, start_fuser: StartFuser, peer: Peer) -> None:
+    roles = tuple(role for role in INERTIAL if role != 'fix_velocity')
+    play = Play(simulated(tmp_path, roles, 12.0), INERTIAL, estimator='lpe')
     rows = rows_of_replay(play, tmp_path / 'out')
     assert len(rows) > 500
     assert_same(rows, rows_of_node(play, start_fuser, peer, max(rows)))
