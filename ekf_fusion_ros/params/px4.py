@@ -17,6 +17,7 @@ from ekf_fusion_ros.params.ekf2 import Ekf2Params
 from ekf_fusion_ros.params.health import HealthParams
 from ekf_fusion_ros.params.lpe import LpeParams
 from ekf_fusion_ros.params.messages import MessageParams
+from ekf_fusion_ros.params.receivers import ReceiversParams
 from ekf_fusion_ros.params.spec import leaves
 
 CHECKS = 'nsats pdop hacc vacc sacc hdrift vdrift hspeed vspeed'.split()
@@ -151,7 +152,7 @@ def translate(foreign: Mapping[str, Any], base: Ekf2Params) -> tuple[dict[str, A
 def _plain_names(base: Ekf2Params) -> dict[str, str]:
     names = SECONDS | MILLISECONDS
     for tree, prefix in ((base, 'ekf2.'), (LpeParams(), 'lpe.'), (MessageParams(), 'messages.'),
-                         (HEALTH, 'health.')):
+                         (ReceiversParams(), 'receivers.'), (HEALTH, 'health.')):
         for name, _, spec in leaves(tree, prefix):
             names.update({foreign: name for foreign in (spec.px4, spec.ecl) if foreign})
     return names
