@@ -25,6 +25,7 @@ from ekf_fusion_ros.messages.decode_landed import decode_landed
 from ekf_fusion_ros.messages.decode_magnetic_field import decode_magnetic_field
 from ekf_fusion_ros.messages.decode_magnetic_field import decode_magnetic_field_rows
 from ekf_fusion_ros.messages.decode_odometry import decode_odometry
+from ekf_fusion_ros.messages.decode_odometry_rows import decode_odometry_rows
 from ekf_fusion_ros.messages.decode_pressure import decode_pressure
 from ekf_fusion_ros.messages.decode_range import decode_range
 from ekf_fusion_ros.messages.flat import FlatRows
@@ -78,6 +79,7 @@ DECODERS: dict[str, Callable[..., Any]] = {
 }
 
 ROWS_DECODERS: dict[str, Callable[..., Any]] = {
+    ODOMETRY: decode_odometry_rows,
     IMU: decode_imu_rows,
     MAGNETIC_FIELD: decode_magnetic_field_rows,
 }

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 from typing import NamedTuple
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,13 +46,16 @@ FORCE, FORCE_COVARIANCE = slice(25, 28), 28
 class ImuReading(NamedTuple):
     """Rate (3,) rad/s and specific force (3,) m/s^2 in body FRD at a stamp.
 
-    orientation (4,) w, x, y, z body FRD to NED, None where the message has none.
+    orientation (4,) w, x, y, z body FRD to NED, None where the message has none. increment: what
+    the reading amounts to since the stamp since_us, where that was computed beforehand.
     """
 
     time_us: int
     rate: Sequence[float]
     specific_force: Sequence[float]
     orientation: Array | None = None
+    increment: ImuSample | None = None
+    since_us: int = -1
 
 
 def decode_imu(message: Any, params: MessageParams) -> ImuReading:
@@ -97,13 +99,20 @@ def decode_imu_rows(rows: FlatRows, params: MessageParams) -> list[ImuReading | 
     rates, forces = (
         np.stack(turned_to_body(columns[name], imu.mount_rpy, rows.frame_id), axis=1)
         for name in (RATE, FORCE))
-    readings = [ImuReading(time_us, rate, force) if plain else None
-                for plain, time_us, rate, force in zip(
-                    good.tolist(), times.tolist(), rates, forces, strict=True)]
+    orientations: list[Array | None] = [None] * len(times)
     for k in np.flatnonzero(present).tolist():
-        orientation = _orientation(rows.numbers[k, ORIENTATION].tolist(), rows.frame_id, imu)
-        readings[k] = cast(ImuReading, readings[k])._replace(orientation=orientation)
-    return readings
+        orientations[k] = _orientation(
+            rows.numbers[k, ORIENTATION].tolist(), rows.frame_id, imu)
+    # Most readings follow the one before them here, so that their increments are known already.
+    intervals = np.diff(times, prepend=times[:1]) * 1e-6
+    angles, velocities = rates * intervals[:, None], forces * intervals[:, None]
+    before_us = [-1, *times[:-1].tolist()]
+    return [ImuReading(time_us, rate, force, orientation, ImuSample(
+                time_us, angle, velocity, dt, dt, orientation=orientation), since_us)
+            if plain else None
+            for plain, time_us, rate, force, orientation, angle, velocity, dt, since_us in zip(
+                good.tolist(), times.tolist(), rates, forces, orientations, angles, velocities,
+                intervals.tolist(), before_us, strict=True)]
 
 
 def _flat(message: Any) -> FlatMessage:
@@ -159,7 +168,12 @@ class ImuIntegrator:
             return [_increments(reading, self._interval_us or self._max_gap_us)]
         self._interval_us = step_us
         missing = 0 < self._longest_us < step_us
-        samples = self._bridge(before, reading) if missing else [_increments(reading, step_us)]
+        if missing:
+            samples = self._bridge(before, reading)
+        elif reading.increment is not None and reading.since_us == last_us:
+            samples = [reading.increment]
+        else:
+            samples = [_increments(reading, step_us)]
         self._note(step_us)
         return samples
 

@@ -15,6 +15,7 @@ Mask = tuple[bool, bool, bool]
 Triple = Sequence[float]
 
 QUATERNION_NORM_ERROR = 0.1
+CORRELATION_MAX = 1.0005
 
 
 def truth(value: object, name: str) -> bool:
@@ -116,7 +117,7 @@ def measured_block(
         upper, lower = flat[6 * (first + i) + first + j], flat[6 * (first + j) + first + i]
         if known[i] and known[j] and (upper or lower):
             mean = 0.5 * upper + 0.5 * lower
-            if not abs(mean) <= 1.0005 * math.sqrt(variance[i] * variance[j]):
+            if not abs(mean) <= CORRELATION_MAX * math.sqrt(variance[i] * variance[j]):
                 raise Refused('indefinite_covariance', f'{name} has a correlation beyond 1')
             block[i, j] = block[j, i] = mean
     return block, (measured[0], measured[1], measured[2])

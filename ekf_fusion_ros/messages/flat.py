@@ -33,20 +33,21 @@ class FlatMessage(NamedTuple):
 
 
 class FlatRows(NamedTuple):
-    """Messages of one type and frame, so many that they are judged together.
+    """Messages of one type and one pair of frames, so many that they are judged together.
 
     sec, nanosec (n,) integers; numbers (n, m), a row as FlatMessage has them.
     """
 
     sec: Integers
     nanosec: Integers
-    frame_id: str
     numbers: Array
+    frame_id: str
+    child_frame_id: str = ''
 
     def row(self, index: int) -> FlatMessage:
         """Return one message."""
         return FlatMessage(int(self.sec[index]), int(self.nanosec[index]), self.frame_id,
-                           self.numbers[index].tolist())
+                           self.numbers[index].tolist(), self.child_frame_id)
 
 
 def flat_message(message: Any, numbers: Sequence[float], child_frame_id: str = '') -> FlatMessage:

@@ -45,27 +45,30 @@ def reader_of(kind: str) -> Callable[[bytes], Any]:
     return read
 
 
-def rows_of(numbers: int, messages: Sequence[bytes]) -> FlatRows | None:
-    """Return messages of a header and so many doubles, None unless all have one layout and frame.
+def rows_of(kind: str, messages: Sequence[bytes]) -> FlatRows | None:
+    """Return messages of a type of TABLES, None unless all have one layout and one frame.
 
     Raises ValueError for bytes that are no such messages.
     """
+    strings, numbers = TABLES[kind]
     first = messages[0]
-    length = _length(first, ORIGIN + 8)
-    begin = ORIGIN + STRING + length
-    begin += -(begin - ORIGIN) % 8
+    names, end = [], ORIGIN + 8
+    for _ in range(strings):
+        begin = end + -(end - ORIGIN) % 4
+        end = begin + 4 + _length(first, begin)
+        names.append(slice(begin, end))
+    begin = end + -(end - ORIGIN) % 8
     size = begin + 8 * numbers
     if any(len(data) != len(first) for data in messages) or len(first) < size:
         return None
     table = np.frombuffer(b''.join(messages), np.uint8).reshape(len(messages), -1)
-    name = slice(ORIGIN + 8, ORIGIN + STRING + length)
-    alike = (table[:, name] == table[0, name]).all() and (table[:, :2] == LITTLE).all()
-    if not alike:
+    alike = all((table[:, name] == table[0, name]).all() for name in names)
+    if not alike or (table[:, :2] != LITTLE).any():
         return None
     stamps = np.ascontiguousarray(table[:, ORIGIN:ORIGIN + 8]).view('<i4, <u4')[:, 0]
     values = np.ascontiguousarray(table[:, begin:size]).view('<f8').astype(np.float64, copy=False)
     return FlatRows(stamps['f0'].astype(np.int64), stamps['f1'].astype(np.int64),
-                    _text(first[ORIGIN + STRING:ORIGIN + STRING + length]), values)
+                    values, *(_text(first[name][4:]) for name in names))
 
 
 _LENGTH = struct.Struct('<I').unpack_from
@@ -153,6 +156,11 @@ DOUBLES = {
     'geometry_msgs/msg/PoseWithCovarianceStamped': 43,
     'geometry_msgs/msg/TwistStamped': 6,
     'geometry_msgs/msg/TwistWithCovarianceStamped': 42,
+}
+# Strings after the stamp, and doubles after them, of what can be read as a table.
+TABLES = {
+    'nav_msgs/msg/Odometry': (2, 85),
+    **{kind: (1, count) for kind, count in DOUBLES.items()},
 }
 READERS: dict[str, Callable[[bytes], FlatMessage]] = {
     'nav_msgs/msg/Odometry': _odometry,

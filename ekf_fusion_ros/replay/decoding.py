@@ -11,7 +11,7 @@ from ekf_fusion_ros.messages.flat import FlatMessage
 from ekf_fusion_ros.messages.flat import FlatRows
 from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.messages.stamps import microseconds
-from ekf_fusion_ros.replay.cdr_reader import DOUBLES
+from ekf_fusion_ros.replay.cdr_reader import TABLES
 from ekf_fusion_ros.replay.cdr_reader import reader_of
 from ekf_fusion_ros.replay.cdr_reader import rows_of
 from ekf_fusion_ros.replay.storage import Message
@@ -31,18 +31,18 @@ class BatchDecoder:
         """Take the topic of each role."""
         self._one = {topic.name: _decoder(role, topic.type, session, withholding)
                      for role, topic in topics.items()}
-        self._together = {topic.name: (role, DOUBLES[topic.type], decode)
+        self._together = {topic.name: (role, topic.type, decode)
                           for role, topic in topics.items()
-                          if topic.type in DOUBLES and role not in withholding.roles
+                          if topic.type in TABLES and role not in withholding.roles
                           and (decode := session.rows_decoder(role)) is not None}
         self.names = frozenset(self._one)
 
     def decode(self, batch: Sequence[Message]) -> list[Decoded]:
         """Return role and sample, or Refused, of each message in their order."""
         decoded: list[Decoded | None] = [None] * len(batch)
-        for name, (role, numbers, decode) in self._together.items():
+        for name, (role, kind, decode) in self._together.items():
             places = [k for k, message in enumerate(batch) if message[1] == name]
-            rows = _rows(numbers, [batch[k][2] for k in places])
+            rows = _rows(kind, [batch[k][2] for k in places])
             for k, sample in zip(places, decode(rows) if rows else (), strict=False):
                 decoded[k] = None if sample is None else (role, sample)
         one = self._one
@@ -50,10 +50,10 @@ class BatchDecoder:
                 for (time_ns, name, data), done in zip(batch, decoded, strict=True)]
 
 
-def _rows(numbers: int, messages: Sequence[bytes]) -> FlatRows | None:
+def _rows(kind: str, messages: Sequence[bytes]) -> FlatRows | None:
     """Return what can be decoded together, None where each message has to be looked at."""
     try:
-        return rows_of(numbers, messages) if messages else None
+        return rows_of(kind, messages) if messages else None
     except ValueError:
         return None
 
