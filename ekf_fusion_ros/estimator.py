@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 import math
 from typing import Any
+from typing import NamedTuple
 from typing import Protocol
 
 import numpy as np
@@ -50,8 +51,7 @@ class GivenPose:
     yaw_var: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class NavState:
+class NavState(NamedTuple):
     """Navigation state of the body origin predicted to `time_us`, NED/FRD, SI.
 
     quaternion (4,) w, x, y, z body to earth; velocity (3,), position (3,) NED; angular_rate (3,)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from dataclasses import replace
 import math
 
 import numpy as np
@@ -190,8 +189,8 @@ class OdometryImu:
                 np.maximum(floor - covariance.diagonal(), 0.0))
         elif not sample.has_position:
             velocity = NAN3
-        return replace(
-            sample, quaternion=attitude, velocity=velocity, velocity_cov=covariance,
+        return sample._replace(
+            quaternion=attitude, velocity=velocity, velocity_cov=covariance,
             velocity_frame=VelocityFrame.BODY_FRD)
 
 

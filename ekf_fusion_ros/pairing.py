@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Sequence
-from dataclasses import replace
 
 from ekf_fusion_ros.messages.decode_fix import FixVelocity
 from ekf_fusion_ros.messages.decode_gps_heading import FixHeading
@@ -16,12 +15,12 @@ Part = FixVelocity | FixHeading
 
 def with_velocity(fix: GnssSample, part: FixVelocity) -> GnssSample:
     """Return a fix with its velocity."""
-    return replace(fix, velocity=part.velocity, sacc=part.accuracy)
+    return fix._replace(velocity=part.velocity, sacc=part.accuracy)
 
 
 def with_heading(fix: GnssSample, part: FixHeading) -> GnssSample:
     """Return a fix with the heading of the vehicle."""
-    return replace(fix, yaw=part.yaw, yaw_offset=part.offset, yaw_accuracy=part.accuracy)
+    return fix._replace(yaw=part.yaw, yaw_offset=part.offset, yaw_accuracy=part.accuracy)
 
 
 class FixPairing:

@@ -6,8 +6,6 @@ scalars and vectors are NaN, so that "not measured" can never be mistaken for ze
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from dataclasses import field
 from enum import Enum
 import math
 from typing import NamedTuple
@@ -20,6 +18,10 @@ NAN3 = np.full(3, math.nan)
 NAN3.flags.writeable = False
 NAN4 = np.full(4, math.nan)
 NAN4.flags.writeable = False
+UNTOLD_POSITION_VAR = np.full(3, 0.1)
+UNTOLD_POSITION_VAR.flags.writeable = False
+UNTOLD_VELOCITY_COV = 0.1 * np.eye(3)
+UNTOLD_VELOCITY_COV.flags.writeable = False
 
 
 class VelocityFrame(Enum):
@@ -29,8 +31,7 @@ class VelocityFrame(Enum):
     BODY_FRD = 1
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ImuSample:
+class ImuSample(NamedTuple):
     """Inertial increments over the interval that ends at `time_us`, body FRD.
 
     delta_angle (3,) rad, coning-corrected where the source can; delta_velocity (3,) m/s,
@@ -59,8 +60,7 @@ class Antenna(NamedTuple):
     velocity: Array
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class GnssSample:
+class GnssSample(NamedTuple):
     """A GNSS fix.
 
     lat, lon deg; alt m in the datum of the source; velocity (3,) m/s NED; eph, epv 1-sigma m;
@@ -75,7 +75,7 @@ class GnssSample:
     alt: float
     eph: float
     epv: float
-    velocity: Array = field(default_factory=lambda: NAN3)
+    velocity: Array = NAN3
     sacc: float = math.nan
     fix_type: int = 3
     nsats: int | None = None
@@ -91,24 +91,21 @@ class GnssSample:
         return math.isfinite(self.velocity[0])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MagSample:
+class MagSample(NamedTuple):
     """Magnetic field (3,) in Gauss, body FRD."""
 
     time_us: int
     field: Array
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BaroSample:
+class BaroSample(NamedTuple):
     """Pressure altitude in m, up positive."""
 
     time_us: int
     altitude: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class VisionSample:
+class VisionSample(NamedTuple):
     """Pose and velocity from an odometry source ("external vision").
 
     position (3,) m in the odometry's local frame (FRD or NED); quaternion (4,) w, x, y, z body to
@@ -120,9 +117,9 @@ class VisionSample:
     time_us: int
     position: Array
     quaternion: Array
-    velocity: Array = field(default_factory=lambda: NAN3)
-    position_var: Array = field(default_factory=lambda: np.full(3, 0.1))
-    velocity_cov: Array = field(default_factory=lambda: 0.1 * np.eye(3))
+    velocity: Array = NAN3
+    position_var: Array = UNTOLD_POSITION_VAR
+    velocity_cov: Array = UNTOLD_VELOCITY_COV
     angular_var: float = 0.05
     velocity_frame: VelocityFrame = VelocityFrame.LOCAL_FRD
     reset_counter: int = 0
@@ -143,8 +140,7 @@ class VisionSample:
         return math.isfinite(self.velocity[0])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RangeSample:
+class RangeSample(NamedTuple):
     """Slant distance in m along the sensor axis; quality 0..100, -1 = not known.
 
     variance m^2, 0 = not known; `ultrasound` tells a sonar from a lidar.
@@ -159,8 +155,7 @@ class RangeSample:
     ultrasound: bool = False
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FlowSample:
+class FlowSample(NamedTuple):
     """Optical flow over the `dt` s before `time_us`.
 
     flow (2,) rad: angle of the scene about body x and y (FRD); without rotation it is
@@ -175,8 +170,7 @@ class FlowSample:
     dt: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class AirspeedSample:
+class AirspeedSample(NamedTuple):
     """True airspeed in m/s and the factor from equivalent to true airspeed."""
 
     time_us: int
@@ -184,8 +178,7 @@ class AirspeedSample:
     eas2tas: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class AuxVelocitySample:
+class AuxVelocitySample(NamedTuple):
     """Velocity (3,) m/s NED against a fixed target and its variance (3,)."""
 
     time_us: int
@@ -193,8 +186,7 @@ class AuxVelocitySample:
     variance: Array
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LandedSample:
+class LandedSample(NamedTuple):
     """Ground contact; acts at once. The two vehicle flags come with it."""
 
     time_us: int
@@ -203,16 +195,14 @@ class LandedSample:
     fuse_beta: bool = False
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ArmedSample:
+class ArmedSample(NamedTuple):
     """Whether the vehicle is armed; acts at once, on navigation health alone."""
 
     time_us: int
     armed: bool
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class HeadingSample:
+class HeadingSample(NamedTuple):
     """Heading of the odometry frame against true north, found from motion.
 
     yaw rad such that v_ned = Rz(yaw) v_odometry_frd; variance rad^2; `time_us` is the time at

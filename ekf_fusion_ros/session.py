@@ -7,7 +7,6 @@ from collections.abc import Callable
 from collections.abc import Collection
 from collections.abc import Mapping
 from collections.abc import Sequence
-from dataclasses import replace
 import math
 from typing import TYPE_CHECKING
 from typing import Any
@@ -299,7 +298,7 @@ class FusionSession:
             self._last_altitude = fix.alt
             return fix
         # A fix without height still places the vehicle; its height must carry no weight.
-        return replace(fix, alt=self._last_altitude, epv=NO_HEIGHT_EPV)
+        return fix._replace(alt=self._last_altitude, epv=NO_HEIGHT_EPV)
 
     def _aid(self, role: str, sample: Any) -> None:
         """Hand an aiding sample to the estimator and to what looks for yaw in motion."""
@@ -316,7 +315,7 @@ class FusionSession:
     def _tell_landed(self) -> None:
         """Tell of ground contact, which acts at once, or as soon as there is inertial time."""
         if self._landed is not None and self._now_us is not None:
-            self._estimator.push(replace(self._landed, time_us=self._now_us))
+            self._estimator.push(self._landed._replace(time_us=self._now_us))
 
     def _push_odometry(self, sample: VisionSample) -> None:
         self._heading.push(sample)

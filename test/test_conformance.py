@@ -164,7 +164,7 @@ def test_backward_stamps_are_refused_and_harmless(name):
 def test_fixes_of_bad_covariance_change_nothing(name, value):
     def spoilt(sample, t):
         bad = isinstance(sample, GnssSample) and t > 30.0
-        return replace(sample, eph=value, lat=sample.lat + 1.0) if bad else sample
+        return sample._replace(eph=value, lat=sample.lat + 1.0) if bad else sample
 
     run = Run(name, REST, change=spoilt)
     position, _ = run.errors(30.0, 34.0)

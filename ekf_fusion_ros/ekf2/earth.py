@@ -28,6 +28,7 @@ class EarthReference:
         self._field_name = field_model
         self._field_model: MagneticField | None = None
         self.projection: Projection | None = None
+        self.origin: GeoPoint | None = None
         self.origin_lat = math.nan
         self.origin_lon = math.nan
         self.alt_ref = 0.0
@@ -39,15 +40,10 @@ class EarthReference:
         """True once the local frame is tied to the earth."""
         return self.projection is not None
 
-    def origin(self) -> GeoPoint | None:
-        """Return the origin, None before it is set."""
-        if self.projection is None:
-            return None
-        return GeoPoint(self.origin_lat, self.origin_lon, self.alt_ref)
-
     def set_origin(self, lat: float, lon: float, alt: float) -> None:
         """Tie position (0, 0, 0) to a point; deg, m."""
         self.projection = make_projection(self._projection_name, lat, lon, alt)
+        self.origin = GeoPoint(lat, lon, alt)
         self.origin_lat, self.origin_lon, self.alt_ref = lat, lon, alt
 
     def set_origin_from(self, lat: float, lon: float, alt: float, position: Array) -> None:

@@ -75,6 +75,7 @@ class Ekf2:
         self._accel_bias_check = AccelBiasCheck(self.filter)
         self._ground_contact = GroundContact(self.filter)
         self._raw: ImuSample | None = None
+        self._nav: NavState | None = None
         self._too_early: Counter[type] = Counter()
         self.initialised = False
         self._queues = self._make_queues()
@@ -97,6 +98,7 @@ class Ekf2:
 
     def push(self, sample: Sample) -> None:
         """Queue a measurement; those before the first ImuSample have no effect."""
+        self._nav = None
         if isinstance(sample, ImuSample):
             if self._raw is not None:
                 self.update()
@@ -112,6 +114,7 @@ class Ekf2:
         raw, self._raw = self._raw, None
         if raw is None:
             return False
+        self._nav = None
         f, inertial = self.filter, self.inertial
         complete = inertial.add(raw, f.flags.in_air, f.output, f.x, f.dt_avg)
         f.t_now = raw.time_us
@@ -177,7 +180,9 @@ class Ekf2:
 
     def nav_state(self) -> NavState | None:
         """Return the state predicted to the newest IMU sample, None before initialisation."""
-        return nav_state(self) if self.initialised else None
+        if self._nav is None and self.initialised:
+            self._nav = nav_state(self)
+        return self._nav
 
     def states(self) -> Array:
         """Return the states (24,) at the fusion horizon; `ekf2.state.STATES` is their index map.
@@ -225,6 +230,7 @@ class Ekf2:
 
     def set_origin(self, origin: GeoPoint) -> bool:
         """Move the origin of the local frame, keeping the place of the vehicle on the earth."""
+        self._nav = None
         return self.control.move_origin(origin)
 
     def adopt(self, params: Ekf2Params) -> None:
@@ -234,6 +240,7 @@ class Ekf2:
         nothing was fused yet. Raises ValueError, naming the parameter, when one is out of range.
         """
         validate(params)
+        self._nav = None
         self.params = params
         self.filter.adopt(params)
         self.filter.cov.set_noise(params)
@@ -244,6 +251,7 @@ class Ekf2:
         What the pose does not give stays; the velocity turns with the yaw. Sensors that measure
         the same go on and may contradict it. False before initialisation.
         """
+        self._nav = None
         if self.initialised:
             self.control.set_pose(pose)
         return self.initialised

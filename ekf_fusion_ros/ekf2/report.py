@@ -46,32 +46,50 @@ def pose_covariance(x: Array, p: Array) -> Array:
     return covariance
 
 
+@kernel
+def navigation(output: NDArray[np.void], x: Array, p: Array, dt_avg: float) -> Array:
+    """Return what a NavState holds of one OUTPUT and of states and covariance, (67,).
+
+    quaternion, velocity and position (10), angular rate (3), acceleration (3), gyro and
+    accelerometer biases (6), covariances of pose (36) and velocity (9).
+    """
+    s = output[0]
+    row = np.empty(67)
+    row[0:10] = s['now']
+    row[13:16] = s['acceleration']
+    row[16:22] = x[10:16] / dt_avg
+    row[10:13] = s['rate'] - row[16:19]
+    row[22:58] = pose_covariance(x, p).ravel()
+    for i in range(3):
+        row[58 + 3 * i:61 + 3 * i] = p[4 + i, 4:7]
+    return row
+
+
 def nav_state(ekf: Ekf2) -> NavState:
-    """Return the output predictor's state at the body origin."""
+    """Return the output predictor's state at the body origin; its arrays are read-only."""
     f = ekf.filter
     out = f.output
-    now = out.now.copy()
-    velocity, position = now[4:7], now[7:10]
+    p = f.cov.p
+    row = navigation(out.state, f.x, p, f.dt_avg)
+    row.flags.writeable = False
+    velocity, position = row[4:7], row[7:10]
     if ekf.params.imu.position != ZERO:
         lever = np.asarray(ekf.params.imu.position)
         velocity, position = out.velocity_at_origin(lever), out.position_at_origin(lever)
-    p = f.cov.p
     validity = ekf.control.validity
-    biases = f.x[10:16] / f.dt_avg
-    gyro_bias = biases[0:3]
     terrain = ekf.control.terrain
     wind = f.flags.wind
     return NavState(
         time_us=f.t_now,
-        quaternion=now[0:4],
+        quaternion=row[0:4],
         velocity=velocity,
         position=position,
-        angular_rate=out.rate - gyro_bias,
-        pose_cov=pose_covariance(f.x, p),
-        velocity_cov=p[4:7, 4:7].copy(),
-        gyro_bias=gyro_bias,
-        accel_bias=biases[3:6],
-        origin=f.earth.origin(),
+        angular_rate=row[10:13],
+        pose_cov=row[22:58].reshape(6, 6),
+        velocity_cov=row[58:67].reshape(3, 3),
+        gyro_bias=row[16:19],
+        accel_bias=row[19:22],
+        origin=f.earth.origin,
         yaw_aligned=f.flags.yaw_align,
         dead_reckoning=f.dead_reckoning,
         local_position_valid=validity.local_position,
@@ -79,7 +97,7 @@ def nav_state(ekf: Ekf2) -> NavState:
         gnss_started=f.observations.gps_hor_pos.starts > 0,
         in_air=f.flags.in_air,
         yaw_jump=ekf.control.resets.counters.yaw_sum,
-        acceleration=out.acceleration.copy(),
+        acceleration=row[13:16],
         wind=f.x[WIND].copy() if wind else None,
         wind_cov=p[WIND, WIND].copy() if wind else None,
         ground_down=terrain.ground_down() if terrain.valid else None,

@@ -107,7 +107,7 @@ class ReceiverBank:
         """Take a fix of a receiver; return the blended ones that it completes."""
         own_delay_us = self._receivers[name].delay_us
         if own_delay_us != self._delay_us:
-            fix = replace(fix, time_us=fix.time_us - own_delay_us + self._delay_us)
+            fix = fix._replace(time_us=fix.time_us - own_delay_us + self._delay_us)
         self._note_arrival(name, fix.time_us)
         blended: list[GnssSample] = []
         if name in self._epoch and not self._is_late(name):
@@ -229,8 +229,8 @@ class ReceiverBank:
         best = max(shares[POSITION], key=lambda name: shares[POSITION][name])
         fixes = [self._readings[name].fix for name in shares[POSITION]]
         with_yaw = next((fix for fix in fixes if math.isfinite(fix.yaw)), fixes[0])
-        return replace(
-            self._readings[best].fix, time_us=time_us, lat=place.lat, lon=place.lon,
+        return self._readings[best].fix._replace(
+            time_us=time_us, lat=place.lat, lon=place.lon,
             alt=place.alt, eph=eph, epv=epv if shares[HEIGHT] else UNKNOWN_HEIGHT_EPV,
             velocity=place.velocity if shares[VELOCITY] else NAN3, sacc=sacc,
             fix_type=max(fix.fix_type for fix in fixes),

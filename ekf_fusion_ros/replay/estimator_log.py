@@ -195,7 +195,7 @@ def _tail(ekf: Ekf2) -> list[float]:
     f = ekf.filter
     bank, count = ekf.control.bank, ekf.control.resets.counters
     running = bank.running
-    origin = f.earth.origin()
+    origin = f.earth.origin
     seen = f.observations
     further = (seen.range_height, seen.airspeed, seen.sideslip, seen.drag, seen.flow, seen.hagl,
                seen.aux_vel)

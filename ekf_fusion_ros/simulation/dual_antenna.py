@@ -44,7 +44,7 @@ class DualAntennaGnss(Gnss):
         heading = self._heading(trajectory, instants, rng)[self.present(instants)]
         accuracy = max(self.heading_noise, 0.001)
         return [
-            replace(sample, yaw=wrap_pi(float(yaw)), yaw_offset=self.antenna_offset,
+            sample._replace(yaw=wrap_pi(float(yaw)), yaw_offset=self.antenna_offset,
                     yaw_accuracy=accuracy) if math.isfinite(yaw) else sample
             for sample, yaw in zip(samples, heading, strict=True)
         ]

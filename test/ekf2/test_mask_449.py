@@ -211,8 +211,9 @@ def in_odometry_frame(sample):
     if not isinstance(sample, VisionSample):
         return sample
     turn = matrix_from_quat(sample.quaternion)
-    return replace(sample, velocity=turn @ sample.velocity, velocity_frame=VelocityFrame.LOCAL_FRD,
-                   velocity_cov=turn @ sample.velocity_cov @ turn.T)
+    return sample._replace(
+        velocity=turn @ sample.velocity, velocity_frame=VelocityFrame.LOCAL_FRD,
+        velocity_cov=turn @ sample.velocity_cov @ turn.T)
 
 
 def test_velocity_of_the_rotated_odometry_frame_is_that_of_the_body(flown):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 import math
 
 import numpy as np
@@ -35,14 +34,14 @@ class Rig:
         for _ in range(round(seconds * 1e6 / STEP_US)):
             self.now_us += STEP_US
             if self.interval_us and self.now_us % self.interval_us == 0:
-                self.finder.push(replace(self.sample, time_us=self.now_us), 0)
+                self.finder.push(self.sample._replace(time_us=self.now_us), 0)
             self.filter.t_horizon = self.filter.t_now = self.now_us
             self.finder.pop()
             self.were_valid.append(self.finder.valid)
         return self.finder.valid
 
     def see(self, distance: float, quality: int = 100) -> None:
-        self.sample = replace(self.sample, distance=distance, quality=quality)
+        self.sample = self.sample._replace(distance=distance, quality=quality)
 
     def lean(self, roll: float, pitch: float, yaw: float = 0.4) -> None:
         self.filter.rot = matrix_from_euler_321(roll, pitch, yaw)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from dataclasses import replace
+from itertools import compress
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ class Flown:
     def after(self, start, end=np.inf):
         kept = (self.time >= start) & (self.time < end)
         return Flown(self.time[kept], self.position[kept], self.velocity[kept],
-                     self.angle[kept], tuple(np.array(self.states, dtype=object)[kept]))
+                     self.angle[kept], tuple(compress(self.states, kept)))
 
     def rms(self, axes=slice(0, 3)):
         return float(np.sqrt(np.mean(np.sum(self.position[:, axes] ** 2, axis=1))))
@@ -54,7 +54,7 @@ def fly(estimator, scenario, *, true_attitude, change=lambda sample: sample, loc
             estimator.push(LandedSample(arrival.time_us, landed=False))
         sample = arrival.sample
         if true_attitude and isinstance(sample, ImuSample):
-            sample = replace(sample, orientation=truth[sample.time_us])
+            sample = sample._replace(orientation=truth[sample.time_us])
         sample = change(sample)
         if sample is not None:
             estimator.push(sample)

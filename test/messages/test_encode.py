@@ -60,7 +60,7 @@ def test_odometry_by_hand():
     half = math.sqrt(0.5)
     # Nose to the east, 3 m/s east, climbing 1 m/s, turning right.
     nav = random_nav(0)
-    nav = NavState(**{name: getattr(nav, name) for name in NavState.__slots__} | {
+    nav = NavState(**{name: getattr(nav, name) for name in NavState._fields} | {
         'quaternion': np.array((half, 0.0, 0.0, half)), 'velocity': np.array((0.0, 3.0, -1.0)),
         'position': np.array((10.0, 20.0, -30.0)), 'angular_rate': np.array((0.1, 0.2, 0.3)),
         'velocity_cov': np.diag((1.0, 2.0, 3.0))})

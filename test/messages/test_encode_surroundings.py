@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 import math
 
 from messages.test_encode import random_nav
@@ -17,7 +16,7 @@ from ekf_fusion_ros.messages.encode_surroundings import encode_wind
 def looking_east(**fields):
     """A level vehicle whose nose points east."""
     half = math.sqrt(0.5)
-    return replace(random_nav(1), quaternion=np.array([half, 0.0, 0.0, half]), **fields)
+    return random_nav(1)._replace(quaternion=np.array([half, 0.0, 0.0, half]), **fields)
 
 
 def test_acceleration_is_that_of_the_body():

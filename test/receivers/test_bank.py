@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 import math
 
 import numpy as np
@@ -34,7 +33,7 @@ def bank_of(names, state=lambda: None, antennas=None, **params):
 
 def fix_at(seconds, north=0.0, up=0.0, **changes):
     fix = GnssSample(START + round(1e6 * seconds), 47.0 + north * METRE, 8.0, 500.0 + up, 1.0, 2.0)
-    return replace(fix, **changes)
+    return fix._replace(**changes)
 
 
 def north_of(fix):
@@ -105,7 +104,7 @@ def test_all_alike_far_from_the_prediction_are_believed():
 def test_a_reset_of_the_estimate_between_two_fixes_excludes_nobody():
     """The estimate was 30 m off when the first came and is right for the second."""
     place = [np.array((-30.0, 0.0, 0.0))]
-    bank = bank_of(('a', 'b'), lambda: replace(standing(), position=place[0]), wait_ms=50.0)
+    bank = bank_of(('a', 'b'), lambda: standing()._replace(position=place[0]), wait_ms=50.0)
     bank.push('a', fix_at(1.0))
     bank.advance(START + round(1.06e6))
     place[0] = np.zeros(3)

@@ -32,11 +32,11 @@ def dropped(_):
 
 
 def biased(fix):
-    return replace(fix, lat=fix.lat + 20.0 * METRE)
+    return fix._replace(lat=fix.lat + 20.0 * METRE)
 
 
 def shifted(metres):
-    return lambda _, fix: replace(fix, lat=fix.lat + metres * METRE)
+    return lambda _, fix: fix._replace(lat=fix.lat + metres * METRE)
 
 
 @pytest.fixture(scope='module')
@@ -152,6 +152,6 @@ def test_the_first_may_be_silent():
 
 def test_a_velocity_may_be_missing_at_times():
     flown = fly({'fix': BETTER, 'fix_2': WORSE}, 0, {
-        'fix': lambda t, fix: replace(fix, velocity=NAN3, sacc=math.nan)
+        'fix': lambda t, fix: fix._replace(velocity=NAN3, sacc=math.nan)
         if round(5 * t) % 3 == 0 else fix})
     assert flown.rms(SETTLED) < 1.5

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -104,5 +102,5 @@ class Vision:
         f = self._f
         if f.vision_lever is None:
             return sample
-        return dataclasses.replace(sample, position=sample.position - f.rot @ f.vision_lever)
+        return sample._replace(position=sample.position - f.rot @ f.vision_lever)
 
