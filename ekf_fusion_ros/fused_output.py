@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from ekf_fusion_ros.estimator import NavState
 from ekf_fusion_ros.samples import GnssSample
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FusedOutput:
+class FusedOutput(NamedTuple):
     """One due output: the state at `nav.time_us` and the fixes taken in since the last one.
 
     `local` is True where the frame is the odometry's own because no fix takes part.

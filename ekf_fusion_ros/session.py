@@ -99,7 +99,6 @@ class FusionSession:
         self._make_decoders()
         self._inertial_role = IMU if roles is None or IMU in roles else ODOMETRY
         self._local = self._is_local()
-        self._gap_notice = self.params.session.gap_notice
         self._rate_mhz = round(1000 * self.params.session.output_rate)
         self._last_altitude = 0.0
         self.restarts = 0
@@ -135,7 +134,8 @@ class FusionSession:
         self._now_us: int | None = None
         self._tick: int | None = None
         self._fixes: list[GnssSample] = []
-        self._inertial_order = InertialOrder(round(SECOND_US * session.stamp_gap_max))
+        self._inertial_order = InertialOrder(
+            round(SECOND_US * session.stamp_gap_max), round(SECOND_US * session.gap_notice))
         lead_us = round(SECOND_US * session.stamp_lead_max)
         self._aiding_order = {
             role: AidingOrder(lead_us, age_limit_us(self.params, role)) for role in roles}
@@ -243,25 +243,25 @@ class FusionSession:
     def _judge(self, role: str, reading: Any) -> None:
         """Raise Refused for a reading that comes out of order or is worth nothing."""
         if role == self._inertial_role:
-            self._judge_inertial_order(role, reading.time_us)
-        elif role not in WITHOUT_STAMP:
+            before_us = self._inertial_order.last
+            step = self._inertial_order.judge(reading.time_us)
+            if before_us is not None and step is not Step.FORWARD:
+                self._follow_step(role, step, reading.time_us, before_us)
+            return
+        if role not in WITHOUT_STAMP:
             self._aiding_order[role].judge(reading.time_us, self._inertial_order.last)
         if role == AIRSPEED:
             check_airspeed(reading, self.params.ekf2.aiding)
 
-    def _judge_inertial_order(self, role: str, time_us: int) -> None:
-        before = self._inertial_order.last
-        step = self._inertial_order.judge(time_us)
-        if before is None:
-            return
-        gap = (time_us - before) / SECOND_US
-        if step is Step.RESTART:
-            self._tell(time_us, f'the stamps of {role} jumped by {gap:+.3f} s: the estimator '
-                       'starts again')
-            self._restart()
-            self._inertial_order.judge(time_us)
-        elif gap > self._gap_notice:
+    def _follow_step(self, role: str, step: Step, time_us: int, before_us: int) -> None:
+        gap = (time_us - before_us) / SECOND_US
+        if step is Step.PAUSE:
             self._tell(time_us, f'no {role} message for {gap:.3f} s')
+            return
+        self._tell(time_us, f'the stamps of {role} jumped by {gap:+.3f} s: the estimator '
+                   'starts again')
+        self._restart()
+        self._inertial_order.judge(time_us)
 
     def _accept(self, role: str, sample: Any) -> list[FusedOutput]:
         if role == self._inertial_role:

@@ -14,8 +14,8 @@ USUAL_STEPS = 4
 class Step(Enum):
     """How an inertial stamp follows the one before."""
 
-    FIRST = 0
-    FORWARD = 1
+    FORWARD = 0
+    PAUSE = 1
     RESTART = 2
 
 
@@ -35,9 +35,11 @@ class InertialOrder:
     or a long pause is believed when the next message continues from it.
     """
 
-    def __init__(self, jump_us: int) -> None:
+    def __init__(self, jump_us: int, notice_us: int) -> None:
+        """Take the least jump that begins a new time, and the least pause worth telling."""
         self._jump_us = jump_us
-        self._sure_us = min(jump_us, PAUSE_US)
+        self._notice_us = notice_us
+        self._usual_us = min(jump_us, notice_us, PAUSE_US)
         self._suspect: int | None = None
         self._step = jump_us
         self.last: int | None = None
@@ -46,9 +48,9 @@ class InertialOrder:
         """Return the kind of step; raise Refused for a stamp that is not usable."""
         if self.last is None:
             self.last = time_us
-            return Step.FIRST
+            return Step.FORWARD
         step = time_us - self.last
-        if 0 < step <= self._sure_us:
+        if 0 < step <= self._usual_us:
             self.last, self._step, self._suspect = time_us, step, None
             return Step.FORWARD
         if -self._jump_us <= step <= 0:
@@ -59,7 +61,9 @@ class InertialOrder:
             raise Refused('stamp_jump', f'stamp {step / 1e6:+.3f} s from the one before')
         self._step = self._jump_us if restart else step
         self.last, self._suspect = time_us, None
-        return Step.RESTART if restart else Step.FORWARD
+        if restart:
+            return Step.RESTART
+        return Step.PAUSE if step > self._notice_us else Step.FORWARD
 
     def _longest_step(self) -> int:
         return max(PAUSE_US, USUAL_STEPS * self._step)

@@ -90,7 +90,8 @@ def climb() -> Iterator[Sample]:
             yield FlowSample(time_us, 0.05 * seen, np.zeros(3), 255, 0.05)
             yield AirspeedSample(time_us, 1.0 + ACCELERATION * run_up, 1.0)
         if number % 4 == 0:
-            yield VisionSample(time_us, place, LEVEL, velocity)
+            yield VisionSample(
+                time_us, place, LEVEL, velocity, np.full(3, 0.1), 0.1 * np.eye(3))
         if number % 20 == 0:
             yield GnssSample(
                 time_us, 47.0 + place[0] / METRES_PER_DEGREE, 8.0, 100.0 - place[2], 0.5, 0.8,

@@ -55,17 +55,17 @@ class InertialInput:
 
         Any other carries the output predictor on; x (24,), dt_avg mean filter period in s.
         """
+        time_us, angle, velocity, angle_dt, velocity_dt, clipping, _ = sample
         complete = take_raw(
-            self._state, output.state, x, sample.time_us, sample.delta_angle,
-            sample.delta_velocity, sample.delta_angle_dt, sample.delta_velocity_dt, dt_avg, in_air)
-        if sample.clipping != NO_CLIPPING:
+            self._state, output.state, x, time_us, angle, velocity, angle_dt, velocity_dt, dt_avg,
+            in_air)
+        if clipping != NO_CLIPPING:
             before = self._clipping
             first, second, third = (
-                bool(a or b) for a, b in zip(before, sample.clipping, strict=True))
+                bool(a or b) for a, b in zip(before, clipping, strict=True))
             self._clipping = (first, second, third)
         if not complete:
             return False
-        time_us = sample.time_us
         self.ring.append(DelayedImu(time_us, self._period.copy(), self._clipping))
         self._clipping = NO_CLIPPING
         self._judge_rest()

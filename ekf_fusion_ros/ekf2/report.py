@@ -47,14 +47,15 @@ def pose_covariance(x: Array, p: Array) -> Array:
 
 
 @kernel
-def navigation(output: NDArray[np.void], x: Array, p: Array, dt_avg: float) -> Array:
-    """Return what a NavState holds of one OUTPUT and of states and covariance, (67,).
+def navigation(
+    output: NDArray[np.void], x: Array, p: Array, dt_avg: float, row: Array,
+) -> None:
+    """Fill row (67,) with what a NavState holds of one OUTPUT and of states and covariance.
 
     quaternion, velocity and position (10), angular rate (3), acceleration (3), gyro and
     accelerometer biases (6), covariances of pose (36) and velocity (9).
     """
     s = output[0]
-    row = np.empty(67)
     row[0:10] = s['now']
     row[13:16] = s['acceleration']
     row[16:22] = x[10:16] / dt_avg
@@ -62,16 +63,15 @@ def navigation(output: NDArray[np.void], x: Array, p: Array, dt_avg: float) -> A
     row[22:58] = pose_covariance(x, p).ravel()
     for i in range(3):
         row[58 + 3 * i:61 + 3 * i] = p[4 + i, 4:7]
-    return row
 
 
 def nav_state(ekf: Ekf2) -> NavState:
-    """Return the output predictor's state at the body origin; its arrays are read-only."""
+    """Return the output predictor's state at the body origin."""
     f = ekf.filter
     out = f.output
     p = f.cov.p
-    row = navigation(out.state, f.x, p, f.dt_avg)
-    row.flags.writeable = False
+    row = np.empty(67)
+    navigation(out.state, f.x, p, f.dt_avg, row)
     velocity, position = row[4:7], row[7:10]
     if ekf.params.imu.position != ZERO:
         lever = np.asarray(ekf.params.imu.position)

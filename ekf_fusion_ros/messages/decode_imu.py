@@ -174,7 +174,9 @@ class ImuIntegrator:
             samples = [reading.increment]
         else:
             samples = [_increments(reading, step_us)]
-        self._note(step_us)
+        self._steps_us.append(step_us)
+        if len(self._steps_us) == USUAL_OF:
+            self._learn_usual_interval()
         return samples
 
     def _bridge(self, before: ImuReading, reading: ImuReading) -> list[ImuSample]:
@@ -194,13 +196,11 @@ class ImuIntegrator:
             last_us = time_us
         return samples
 
-    def _note(self, step_us: int) -> None:
-        """Learn the usual interval: the median of some, then of the next ones."""
-        self._steps_us.append(step_us)
-        if len(self._steps_us) == USUAL_OF:
-            self._usual_us = sorted(self._steps_us)[USUAL_OF // 2]
-            self._longest_us = round(MISSING_FROM * self._usual_us)
-            self._steps_us.clear()
+    def _learn_usual_interval(self) -> None:
+        """Take the median of some intervals; later of the next ones."""
+        self._usual_us = sorted(self._steps_us)[USUAL_OF // 2]
+        self._longest_us = round(MISSING_FROM * self._usual_us)
+        self._steps_us.clear()
 
 
 def _increments(reading: ImuReading, step_us: int) -> ImuSample:

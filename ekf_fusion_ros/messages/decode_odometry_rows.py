@@ -57,9 +57,11 @@ def decode_odometry_rows(
     positions, position_vars = _positions(numbers, kind, odometry, good)
     quaternions, angular_vars = _attitudes(numbers, kind, rows.child_frame_id, odometry, good)
     velocities, velocity_covs = _velocities(numbers, rows.child_frame_id, odometry, good)
-    samples = map(
-        VisionSample, times.tolist(), positions, quaternions, velocities, position_vars,
-        velocity_covs, angular_vars.tolist(), repeat(VelocityFrame.BODY_FRD))
+    # Kernels are compiled for contiguous arrays.
+    vectors = map(np.ascontiguousarray, (
+        positions, quaternions, velocities, position_vars, velocity_covs))
+    samples = map(VisionSample, times.tolist(), *vectors, angular_vars.tolist(),
+                  repeat(VelocityFrame.BODY_FRD))
     return [sample if plain else None
             for plain, sample in zip(good.tolist(), samples, strict=True)]
 

@@ -9,6 +9,8 @@ import shutil
 from typing import Any
 from typing import TextIO
 
+import numpy as np
+from numpy.typing import NDArray
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer
 from rosbags.typesys import Stores
@@ -27,9 +29,11 @@ from ekf_fusion_ros.replay.cdr import fix_cdr
 from ekf_fusion_ros.replay.cdr import odometry_cdr
 from ekf_fusion_ros.session import FusionSession
 
+Array = NDArray[np.float64]
 HEADER = 't,x,y,z,qx,qy,qz,qw,vx,vy,vz,yaw,var_x,var_y,var_z,var_yaw'
 ODOMETRY = 'nav_msgs/msg/Odometry'
 NAV_SAT_FIX = 'sensor_msgs/msg/NavSatFix'
+POSE_WORDS = 8
 HALF_SQRT = math.sqrt(0.5)
 
 
@@ -45,11 +49,11 @@ class TrajectorySink:
     def write(self, navs: Sequence[NavState]) -> None:
         """Add one row for each state to each file."""
         tum, table = [], []
-        for nav in navs:
+        for nav, row in zip(navs, _rows(navs), strict=True):
             second, micro = divmod(nav.time_us, 1_000_000)
-            pose = f'{second}.{micro:06d},{",".join(map(repr, _pose(nav)))}'
-            tum.append(pose.replace(',', ' '))
-            table.append(f'{pose},{",".join(map(repr, _velocity_and_variances(nav)))}')
+            words = [f'{second}.{micro:06d}', *map(repr, row)]
+            tum.append(' '.join(words[:POSE_WORDS]))
+            table.append(','.join(words))
         for stream, rows in ((self._tum, tum), (self._csv, table)):
             stream.write('\n'.join([*rows, '']))
         self.rows += len(navs)
@@ -60,21 +64,29 @@ class TrajectorySink:
         self._csv.close()
 
 
-def _pose(nav: NavState) -> tuple[float, ...]:
-    """Return x, y, z ENU and qx, qy, qz, qw FLU to ENU (frames.swap_attitude written out)."""
-    north, east, down = nav.position.tolist()
-    w, x, y, z = nav.quaternion.tolist()
-    return (east, north, -down, HALF_SQRT * (x + y), HALF_SQRT * (x - y), HALF_SQRT * (w - z),
-            HALF_SQRT * (w + z))
+def _rows(navs: Sequence[NavState]) -> list[list[float]]:
+    """Return the numbers of the table in the order of its header, FLU to ENU.
+
+    frames.swap_attitude and its like written out for many states at once.
+    """
+    if not navs:
+        return []
+    north, east, down = np.array([nav.position for nav in navs]).T
+    w, x, y, z = np.array([nav.quaternion for nav in navs]).T
+    v_north, v_east, v_down = np.array([nav.velocity for nav in navs]).T
+    variances = np.array([nav.pose_cov.diagonal() for nav in navs]).T
+    return np.stack((
+        east, north, -down, HALF_SQRT * (x + y), HALF_SQRT * (x - y), HALF_SQRT * (w - z),
+        HALF_SQRT * (w + z), v_east, v_north, -v_down, _yaws(w, x, y, z),
+        variances[1], variances[0], variances[2], variances[5]), axis=1).tolist()
 
 
-def _velocity_and_variances(nav: NavState) -> tuple[float, ...]:
-    north, east, down = nav.velocity.tolist()
-    w, x, y, z = nav.quaternion.tolist()
-    heading = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    yaw = math.remainder(0.5 * math.pi - heading, 2.0 * math.pi)
-    var_n, var_e, var_d, _, _, var_yaw = nav.pose_cov.diagonal().tolist()
-    return east, north, -down, yaw, var_e, var_n, var_d, var_yaw
+def _yaws(w: Array, x: Array, y: Array, z: Array) -> list[float]:
+    """Return the yaws from east, counter-clockwise, rad."""
+    sines, cosines = 2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)
+    # For the arctangent of numpy differs in its last bit between processors.
+    headings = map(math.atan2, sines.tolist(), cosines.tolist())
+    return [math.remainder(0.5 * math.pi - heading, 2.0 * math.pi) for heading in headings]
 
 
 class AlignmentSink:

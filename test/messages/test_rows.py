@@ -154,6 +154,9 @@ def test_odometry_rows_equal_single_messages_to_the_bit(frame, child):
         for name in SAMPLE_ARRAYS:
             ours, other = getattr(sample, name), getattr(alone, name)
             assert (ours + 0.0).tobytes() == (other + 0.0).tobytes(), name
+            # of one type for the kernels, which would be compiled again for another
+            assert ours.flags.c_contiguous, name
+            assert ours.flags.writeable, name
         assert (sample.time_us, sample.angular_var, sample.velocity_frame) == (
             alone.time_us, alone.angular_var, alone.velocity_frame)
 

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.filter import Filter
-from ekf_fusion_ros.kernels.vision import Three
 from ekf_fusion_ros.kernels.vision import turn_velocity
 from ekf_fusion_ros.mathlib.rotation import cross
 from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
@@ -16,20 +15,18 @@ from ekf_fusion_ros.samples import VisionSample
 
 Array = NDArray[np.float64]
 
-LEVEL = np.eye(3)
+def vision_velocity_in_body(f: Filter, sample: VisionSample) -> tuple[Array, Array]:
+    """Return the velocity (3,) of a sample along the body axes at the IMU, and its variances (3,).
 
-
-def vision_velocity_in_body(f: Filter, sample: VisionSample) -> tuple[Three, Three]:
-    """Return velocity in m/s along the body axes at the IMU, and its variances, of a sample.
-
-    A velocity of the odometry frame is turned by the attitude of the odometry.
+    m/s. A velocity of the odometry frame is turned by the attitude of the odometry.
     """
-    in_body = sample.velocity_frame is VelocityFrame.BODY_FRD
-    turn = LEVEL if in_body else np.ascontiguousarray(matrix_from_quat(sample.quaternion).T)
-    velocity, variance = turn_velocity(turn, sample.velocity, sample.velocity_cov)
+    velocity, variance = sample.velocity, sample.velocity_cov.diagonal()
+    if sample.velocity_frame is not VelocityFrame.BODY_FRD:
+        turn = np.ascontiguousarray(matrix_from_quat(sample.quaternion).T)
+        velocity, variance = map(
+            np.array, turn_velocity(turn, sample.velocity, sample.velocity_cov))
     if f.vision_lever is not None:
-        x, y, z = (np.array(velocity) - cross(f.rate, f.vision_lever)).tolist()
-        velocity = x, y, z
+        velocity = velocity - cross(f.rate, f.vision_lever)
     return velocity, variance
 
 

@@ -56,9 +56,9 @@ class VisionVelocity:
         f.last_velocity_variance = noise[0:2]
         gate = f.params.vision.vel_gate
         if velocity_tells_attitude(f, sample):
-            measured, variance = vision_velocity_in_body(f, sample)
+            measured, measured_variance = vision_velocity_in_body(f, sample)
             fuse_body_velocity(f, f.observations.ev_hor_vel, f.observations.ev_ver_vel,
-                               np.array(measured), np.maximum(variance, NOISE_FLOOR), gate)
+                               measured, np.maximum(measured_variance, NOISE_FLOOR), gate)
             return
         fuse_horizontal_velocity(f, f.observations.ev_hor_vel, innovation[0:2], noise[0:2], gate)
         fuse_vertical_velocity(f, f.observations.ev_ver_vel, innovation[2], noise[2], gate)
