@@ -14,12 +14,13 @@ MAX_AGE_US = 100_000
 """A sample older than this against the horizon is too late to be fused."""
 
 TOO_CLOSE = 'too_close'
+NEVER = 2 ** 63
 OVERTAKEN = 'overtaken'
 PUSHED_OUT = 'pushed_out'
 
 
 class SampleBuffer(Generic[T]):
-    """FIFO of fixed capacity, ordered by time.
+    """FIFO of fixed capacity, ordered by time; `next_us` is the time of the oldest, or NEVER.
 
     `newest` stays readable after it has been taken out, but its time is then 0: whoever asks
     "is the newest sample recent" hears "no" until the next one arrives. `passed_over` counts
@@ -30,6 +31,7 @@ class SampleBuffer(Generic[T]):
     def __init__(self, capacity: int) -> None:
         """Hold at most `capacity` samples; pushing past that drops the oldest."""
         self._waiting: deque[tuple[int, T]] = deque(maxlen=capacity)
+        self.next_us = NEVER
         self.newest: T | None = None
         self.newest_time_us = 0
         self.last_arrival_us = 0
@@ -52,6 +54,7 @@ class SampleBuffer(Generic[T]):
         if len(self._waiting) == self._waiting.maxlen:
             self.passed_over[PUSHED_OUT] += 1
         self._waiting.append((time_us, sample))
+        self.next_us = self._waiting[0][0]
         self.newest = sample
         self.newest_time_us = time_us
 
@@ -62,9 +65,9 @@ class SampleBuffer(Generic[T]):
 
     def pop_first_older_than(self, time_us: int) -> tuple[int, T] | None:
         """Take the newest sample with t <= time_us < t + 100 ms, and drop all before it."""
-        waiting = self._waiting
-        if not waiting or waiting[0][0] > time_us:
+        if self.next_us > time_us:
             return None
+        waiting = self._waiting
         for index in range(len(waiting) - 1, -1, -1):
             stamp, sample = waiting[index]
             if stamp <= time_us < stamp + MAX_AGE_US:
@@ -72,7 +75,9 @@ class SampleBuffer(Generic[T]):
                     waiting.popleft()
                     self.passed_over[OVERTAKEN] += 1
                 waiting.popleft()
-                if not waiting:
-                    self.newest_time_us = 0
+                if waiting:
+                    self.next_us = waiting[0][0]
+                else:
+                    self.next_us, self.newest_time_us = NEVER, 0
                 return stamp, sample
         return None

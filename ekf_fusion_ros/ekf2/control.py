@@ -69,6 +69,7 @@ class Control:
                              RangeHeight(f, self.range, self.terrain))
         self.fake_position = FakePosition(f, self.resets)
         self.validity = Validity(f)
+        self._sampled = (self.gnss, self.mag, self.baro, self.vision)
         self._active_before: tuple[bool, ...] = ()
 
     def step(self) -> None:
@@ -104,12 +105,12 @@ class Control:
         """Take what the horizon has passed, after judging whether sensors still deliver."""
         self.gnss.check_arrival()
         self.baro.check_arrival()
-        self.gnss.pop()
-        self.mag.pop()
-        self.baro.pop()
+        horizon_us = self._f.t_horizon
+        for source in self._sampled:
+            if source.popped or source.buffer.next_us <= horizon_us:
+                source.pop()
         self.range.pop()
         self.flow.pop()
-        self.vision.pop()
         self.airspeed.pop()
 
     def _step_air_data(self) -> None:

@@ -59,10 +59,8 @@ class Height:
         """Judge the vertical acceleration and reset a height that is not fused any more."""
         f = self._f
         self._judge_vertical_acceleration()
-        if not f.flags.has_height():
-            return
-        timed_out = f.late(f.times.hgt, TIMEOUT_US)
-        if timed_out or f.late(self._time_good_us, BAD_ACCEL_RESET_US):
+        lost = f.late(f.times.hgt, TIMEOUT_US) or f.late(self._time_good_us, BAD_ACCEL_RESET_US)
+        if lost and f.flags.has_height():
             self._recover()
 
     def _judge_vertical_acceleration(self) -> None:

@@ -68,19 +68,17 @@ class InertialInput:
             return False
         self.ring.append(DelayedImu(time_us, self._period.copy(), self._clipping))
         self._clipping = NO_CLIPPING
-        self._judge_rest()
+        last, motion, vibration = self._times.tolist()
+        self.at_rest = last - motion > REST_TIME_US
+        self.quiet = last - vibration > REST_TIME_US
         self.min_interval_us = (time_us - self.ring[0].time_us) // (self._observation_length - 1)
         return True
 
     @property
     def dt_avg(self) -> float:
         """Mean interval of raw samples in s."""
-        return float(self._mean_dt[0])
-
-    def _judge_rest(self) -> None:
-        last, motion, vibration = self._times.tolist()
-        self.at_rest = last - motion > REST_TIME_US
-        self.quiet = last - vibration > REST_TIME_US
+        mean: float = self._mean_dt.item(0)
+        return mean
 
 
 def buffer_lengths(

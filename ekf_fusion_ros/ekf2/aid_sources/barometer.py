@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ekf_fusion_ros.buffer import SampleBuffer
 from ekf_fusion_ros.ekf2.averaging import SampleAverage
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.fusion import fuse_vertical_position
+from ekf_fusion_ros.ekf2.state import PD
 from ekf_fusion_ros.ekf2.static_pressure import has_pressure_error
 from ekf_fusion_ros.ekf2.static_pressure import pressure_error_height
 from ekf_fusion_ros.samples import BaroSample
-
-Array = NDArray[np.float64]
 
 FAULTY_AFTER_US = 400_000
 OFFSET_GAIN = 0.1
@@ -27,9 +23,9 @@ class Barometer:
     def __init__(self, f: Filter, capacity: int) -> None:
         """Act on a filter."""
         self._f = f
-        self._average = SampleAverage(1)
+        self._average = SampleAverage(0.0)
         self._has_pressure_error = has_pressure_error(f.params.baro)
-        self.buffer: SampleBuffer[Array] = SampleBuffer(capacity)
+        self.buffer: SampleBuffer[float] = SampleBuffer(capacity)
         self.offset = 0.0
         self.count = 0
         self.altitude = 0.0
@@ -41,8 +37,7 @@ class Barometer:
     def push(self, sample: BaroSample, min_interval_us: int) -> None:
         """Average a raw sample in, and queue the mean when the interval has passed."""
         delay_us = round(self._f.params.baro.delay_ms * 1000)
-        mean = self._average.add(sample.time_us, np.array((sample.altitude,)), min_interval_us,
-                                 delay_us)
+        mean = self._average.add(sample.time_us, sample.altitude, min_interval_us, delay_us)
         if mean is None:
             return
         stamp, value = mean
@@ -55,8 +50,8 @@ class Barometer:
         popped = self.buffer.pop_first_older_than(self._f.t_horizon)
         self.popped = popped is not None
         if popped is not None:
-            self._previous_us, self._time_us = self._time_us, popped[0]
-            self.altitude = float(popped[1][0])
+            self._previous_us = self._time_us
+            self._time_us, self.altitude = popped
 
     def check_arrival(self) -> None:
         """Judge whether samples keep coming; call before `pop`."""
@@ -77,22 +72,22 @@ class Barometer:
     @property
     def newest_altitude(self) -> float:
         """Altitude of the newest sample, whether or not the horizon has passed it."""
-        return 0.0 if self.buffer.newest is None else float(self.buffer.newest[0])
+        return 0.0 if self.buffer.newest is None else self.buffer.newest
 
     def fuse(self) -> None:
         """Fuse the popped altitude."""
         f = self._f
         params = f.params.baro
-        innovation = float(f.x[9]) + self.altitude - self.offset
+        innovation = f.x.item(PD) + self.altitude - self.offset
         fuse_vertical_position(f, f.observations.baro_height, innovation,
                                max(params.noise, 0.01) ** 2, params.gate)
 
     def follow(self) -> None:
         """Let the offset follow slowly while another sensor is the reference."""
         if not self.offset_known:
-            self.offset = self.altitude + float(self._f.x[9])
+            self.offset = self.altitude + self._f.x.item(PD)
             self.count = 1
             return
         elapsed = min(max(1e-6 * (self._time_us - self._previous_us), 0.0), 1.0)
-        rate = OFFSET_GAIN * (self.altitude + float(self._f.x[9]) - self.offset)
+        rate = OFFSET_GAIN * (self.altitude + self._f.x.item(PD) - self.offset)
         self.offset += elapsed * min(max(rate, -OFFSET_RATE_MAX), OFFSET_RATE_MAX)

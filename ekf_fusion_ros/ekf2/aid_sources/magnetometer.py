@@ -58,7 +58,7 @@ class Magnetometer:
         self._heading = heading
         self._terrain = terrain
         self._course = CourseAlignment(f, resets, recovery.contradicted)
-        self.average = SampleAverage(3)
+        self.average = SampleAverage(np.zeros(3))
         self.buffer: SampleBuffer[Array] = SampleBuffer(capacity)
         self.lpf = np.zeros(3)
         self.count = 0
@@ -200,7 +200,7 @@ class Magnetometer:
         f = self._f
         gate = f.params.mag.acceleration_gate
         needed = gate if self._yaw_observable else 2.0 * gate
-        acceleration = math.hypot(*f.accel_lpf[0:2].tolist())
+        acceleration = math.hypot(f.accel_lpf.item(0), f.accel_lpf.item(1))
         self._yaw_observable = acceleration > needed and (f.flags.gps or f.flags.ev_pos)
         turned, turn_rate = f.output.yaw.tolist()
         rate_gate = f.params.mag.yaw_rate_gate
