@@ -12,7 +12,7 @@ from ekf_fusion_ros.ekf2.aid_sources.gnss import VERTICAL_NOISE_RATIO
 from ekf_fusion_ros.ekf2.aid_sources.magnetometer import Magnetometer
 from ekf_fusion_ros.ekf2.delayed_imu import DelayedImu
 from ekf_fusion_ros.ekf2.filter import Filter
-from ekf_fusion_ros.ekf2.height import Height
+from ekf_fusion_ros.ekf2.height_source import HeightSource
 from ekf_fusion_ros.ekf2.state import FILTER_PERIOD
 from ekf_fusion_ros.kernels.prediction import GRAVITY
 from ekf_fusion_ros.mathlib.rotation import matrix_from_euler_321
@@ -34,7 +34,7 @@ WIND_VARIANCE = 1.0
 class Alignment:
     """Gathers samples at the horizon until the filter can start."""
 
-    def __init__(self, f: Filter, mag: Magnetometer, baro: Barometer, height: Height,
+    def __init__(self, f: Filter, mag: Magnetometer, baro: Barometer, height: HeightSource,
                  samples_needed: int) -> None:
         """Act on a filter; samples_needed of each required sensor."""
         self._f = f

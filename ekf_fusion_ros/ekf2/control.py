@@ -23,6 +23,8 @@ from ekf_fusion_ros.ekf2.given_pose import take_pose
 from ekf_fusion_ros.ekf2.gnss_checks import GnssChecks
 from ekf_fusion_ros.ekf2.heading import HeadingFusion
 from ekf_fusion_ros.ekf2.height import Height
+from ekf_fusion_ros.ekf2.height_health import HeightHealth
+from ekf_fusion_ros.ekf2.height_source import HeightSource
 from ekf_fusion_ros.ekf2.range_height import RangeHeight
 from ekf_fusion_ros.ekf2.resets import Resets
 from ekf_fusion_ros.ekf2.state import PD
@@ -65,8 +67,13 @@ class Control:
         self.sideslip = Sideslip(f, self.wind)
         self.drag = Drag(f, self.wind, observation_length, imu_length)
         self.aux_velocity = AuxiliaryVelocity(f, observation_length)
-        self.height = Height(f, self.resets, self.baro, self.gnss, self.checks, self.vision,
-                             RangeHeight(f, self.range, self.terrain))
+        ranging = RangeHeight(f, self.range, self.terrain)
+        self.height_source = HeightSource(
+            f, self.resets, self.baro, self.gnss, self.vision, ranging)
+        self._height_health = HeightHealth(
+            f, self.height_source, self.baro, self.gnss, self.vision, ranging)
+        self._height = Height(
+            f, self.height_source, self.baro, self.gnss, self.checks, self.vision, ranging)
         self.fake_position = FakePosition(f, self.resets)
         self.validity = Validity(f)
         self._sampled = (self.gnss, self.mag, self.baro, self.vision)
@@ -81,14 +88,14 @@ class Control:
             self._check_tilt()
         yaw_was_aligned = flags.yaw_align
         self._take_samples()
-        self.height.check_health()
+        self._height_health.step()
         self.mag.step(self.checks)
         self.flow.step()
         self.gnss.step()
         if flags.wind or flags.fuse_aspd or flags.fuse_beta or f.airspeed_popped \
                 or self.drag.enabled:
             self._step_air_data()
-        self.height.step()
+        self._height.step()
         self.vision.step(self.checks, self.gnss.vision_yaw_forbidden)
         self.aux_velocity.step()
         self.fake_position.step(self.checks)
@@ -129,7 +136,7 @@ class Control:
         if not self.gnss.move_origin(origin):
             return False
         if not had_origin:
-            self.height.refer_to(earth.alt_ref - altitude_before)
+            self.height_source.refer_to(earth.alt_ref - altitude_before)
         self._shift_heights(float(self._f.x[PD]) - before)
         return True
 
@@ -142,7 +149,7 @@ class Control:
     def _shift_heights(self, shift: float) -> None:
         """Let what refers to the vehicle's height follow a shift in m, positive down."""
         self.baro.offset += shift
-        self.height.move(shift)
+        self._height.move(shift)
         self.terrain.move(shift)
 
     def _check_tilt(self) -> None:

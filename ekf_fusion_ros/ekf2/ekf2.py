@@ -71,7 +71,7 @@ class Ekf2:
         self.inertial = InertialInput(self._imu_length, self._observation_length,
                                       self.params.imu.moving_scaler)
         self._alignment = Alignment(self.filter, self.control.mag, self.control.baro,
-                                    self.control.height, self._observation_length)
+                                    self.control.height_source, self._observation_length)
         self._accel_bias_check = AccelBiasCheck(self.filter)
         self._ground_contact = GroundContact(self.filter)
         self._raw: ImuSample | None = None
@@ -174,9 +174,9 @@ class Ekf2:
         altitude_before = self.filter.earth.alt_ref
         origin_set = self.control.gnss.push(sample, min_interval_us, self.initialised)
         if origin_set:
-            self.control.height.refer_to(self.filter.earth.alt_ref - altitude_before)
+            self.control.height_source.refer_to(self.filter.earth.alt_ref - altitude_before)
         if origin_set and self.params.height.reference == 'gnss':
-            self.control.height.start_gnss()
+            self.control.height_source.start_gnss()
 
     def nav_state(self) -> NavState | None:
         """Return the state predicted to the newest IMU sample, None before initialisation."""

@@ -164,7 +164,7 @@ def _summary(ekf: Ekf2) -> list[float]:
                        0.0 if math.isnan(position) else position)
     if flags.opt_flow and not flags.aided_other_than(flags.opt_flow):
         velocity = max(seen.flow.test_ratio, tiny)
-    height = ekf.control.height.active_record()
+    height = ekf.control.height_source.active_record()
     return [math.sqrt(max(seen.yaw.test_ratio, seen.mag.test_ratio)), math.sqrt(velocity),
             math.sqrt(position), math.nan if height is None else math.sqrt(height.test_ratio),
             *(math.sqrt(r.test_ratio) for r in (seen.airspeed, seen.hagl, seen.sideslip))]
