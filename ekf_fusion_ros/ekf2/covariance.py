@@ -14,6 +14,7 @@ from ekf_fusion_ros.ekf2.state import SIZE
 from ekf_fusion_ros.kernels.body_velocity import Three
 from ekf_fusion_ros.kernels.body_velocity import fuse_body_velocity
 from ekf_fusion_ros.kernels.compile import kernel
+from ekf_fusion_ros.kernels.compile import machine_code
 from ekf_fusion_ros.kernels.heading import apply_yaw
 from ekf_fusion_ros.kernels.magnetic import correct_by_field
 from ekf_fusion_ros.kernels.magnetic import fuse_declination
@@ -46,6 +47,10 @@ class Covariance:
         """Start at zero; `initialise` gives the first values."""
         self.p: Array = np.zeros((SIZE, SIZE))
         self.limits: Array = np.zeros(6)
+        self._predict = machine_code(predict)
+        self._fuse_state = machine_code(fuse_state)
+        self._fuse_two_states = machine_code(fuse_two_states)
+        self._fuse_declination = machine_code(fuse_declination)
         self.inhibited: Array = self.limits[0:3]
         self._saved_ne = np.zeros((2, 2))
         self._saved_d_body = np.zeros(4)
@@ -95,7 +100,7 @@ class Covariance:
             self._bad_axes = bad_axes
             self._set_velocity_noise()
         clipped = 0 if clipping == NO_AXES else sum(c << k for k, c in enumerate(clipping))
-        outcome: tuple[float, float, bool] = predict(
+        outcome: tuple[float, float, bool] = self._predict(
             x, self.p, rot, imu.increments, earth_rate, self.limits, self._process, dt_avg,
             in_air, bad_accel or self._learns_no_accel_bias, clipped)
         return outcome
@@ -132,7 +137,7 @@ class Covariance:
         self, x: Array, state: int, innovation: float, noise: float, gate: float,
     ) -> tuple[float, float, bool]:
         """Gate and fuse an observation of one state; see kernels.update.fuse_state."""
-        outcome: tuple[float, float, bool] = fuse_state(
+        outcome: tuple[float, float, bool] = self._fuse_state(
             self.p, x, state, innovation, noise, gate, self.limits)
         return outcome
 
@@ -153,7 +158,7 @@ class Covariance:
         gate: float, largest_ratio: float,
     ) -> tuple[float, float, float, int]:
         """Gate and fuse two neighbouring states; see kernels.update.fuse_two_states."""
-        outcome: tuple[float, float, float, int] = fuse_two_states(
+        outcome: tuple[float, float, float, int] = self._fuse_two_states(
             self.p, x, first, innovation[0], innovation[1], noise[0], noise[1], gate,
             largest_ratio, self.limits)
         return outcome
@@ -179,7 +184,7 @@ class Covariance:
         self, x: Array, wanted: float, noise: float, declination: float, shortest: float,
     ) -> tuple[float, float, int]:
         """Correct with the declination; see kernels.magnetic.fuse_declination."""
-        outcome: tuple[float, float, int] = fuse_declination(
+        outcome: tuple[float, float, int] = self._fuse_declination(
             x, self.p, wanted, noise, declination, shortest, self.limits)
         return outcome
 

@@ -127,11 +127,11 @@ class Ekf2:
             if self.control.drag.enabled:
                 self.control.drag.add(raw)
         if not self.initialised:
-            return self._start(raw, complete)
-        self._advance(raw)
+            return self._start(complete)
+        self._advance()
         return True
 
-    def _start(self, raw: ImuSample, complete: bool) -> bool:
+    def _start(self, complete: bool) -> bool:
         """Align with what there is; True when that has begun with a complete filter period."""
         ring = self.inertial.ring
         if not ring or not self._alignment.attempt(ring[-1]):
@@ -143,20 +143,20 @@ class Ekf2:
         f.output.align(f.x)
         self.initialised = True
         if complete:
-            self._advance(raw)
+            self._advance()
         else:
-            f.output.propagate(raw, f.x, f.dt_imu_avg, f.dt_avg)
+            f.output.propagate(self.inertial.raw, f.x, f.dt_imu_avg, f.dt_avg)
         return complete
 
-    def _advance(self, raw: ImuSample) -> None:
-        """Step the filter by the period that a raw sample has completed."""
+    def _advance(self) -> None:
+        """Step the filter by the period that the newest raw sample has completed."""
         f = self.filter
         self._predict()
         self._ground_contact.step(self.inertial.quiet)
         control = self.control
         control.step()
         delay = 1e-6 * (f.t_now - f.t_horizon)
-        f.output.finish_period(raw, f, delay, control.bank, control.bank_airspeed())
+        f.output.finish_period(self.inertial.raw, f, delay, control.bank, control.bank_airspeed())
         control.correct_bank()
 
     def _predict(self) -> None:

@@ -26,6 +26,7 @@ RATE_LIMIT = 0.05
 class InertialInput:
     """The ring of filter periods between now and the fusion horizon.
 
+    `raw` (8,) is the newest raw sample: delta angle, delta velocity, both intervals;
     `at_rest` where nothing has moved for a while, `quiet` where neither vibration nor rotation has
     shown: both as of the last complete period.
     """
@@ -47,6 +48,7 @@ class InertialInput:
         self._mean_dt = state['mean_dt']
         self._times = state['times']
         self._period = state['period']
+        self.raw: Array = state['raw']
         self._clipping = NO_CLIPPING
 
     def add(self, sample: ImuSample, in_air: bool, output: OutputPredictor, x: Array,

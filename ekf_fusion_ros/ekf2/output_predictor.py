@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ekf_fusion_ros.kernels.compile import machine_code
 from ekf_fusion_ros.kernels.output import OUTPUT
 from ekf_fusion_ros.kernels.output import propagate_predictor
 from ekf_fusion_ros.kernels.period import finish_period
 from ekf_fusion_ros.mathlib.rotation import cross
 from ekf_fusion_ros.mathlib.rotation import quat_multiply
 from ekf_fusion_ros.params.ekf2 import OutputParams
-from ekf_fusion_ros.samples import ImuSample
 
 if TYPE_CHECKING:
     from ekf_fusion_ros.ekf2.filter import Filter
@@ -42,6 +42,7 @@ class OutputPredictor:
         self.yaw: Array = output['yaw']
         self.tracking_error: Array = output['tracking_error']
         self._history = np.zeros((history, 10))
+        self._finish_period = machine_code(finish_period)
 
     def align(self, x: Array) -> None:
         """Start from the filter state (24,)."""
@@ -49,23 +50,20 @@ class OutputPredictor:
         self.now[:] = x[0:10]
         self.state['running'] = True
 
-    def propagate(self, imu: ImuSample, x: Array, dt_imu_avg: float, dt_avg: float) -> None:
-        """Advance by one raw IMU sample that completes no filter period."""
-        propagate_predictor(self.state, imu.delta_angle, imu.delta_velocity, imu.delta_angle_dt,
-                            imu.delta_velocity_dt, x, dt_imu_avg / dt_avg)
+    def propagate(self, raw: Array, x: Array, dt_imu_avg: float, dt_avg: float) -> None:
+        """Advance by one raw sample (8,) that completes no filter period."""
+        propagate_predictor(self.state, raw, x, dt_imu_avg / dt_avg)
 
     def finish_period(
-        self, imu: ImuSample, f: Filter, delay: float, bank: YawEstimator, airspeed: float,
+        self, raw: Array, f: Filter, delay: float, bank: YawEstimator, airspeed: float,
     ) -> None:
-        """Advance by the raw sample that completes a period, and compare with the filter.
+        """Advance by the raw sample (8,) that completes a period, and compare with the filter.
 
         The state of the filter lies `delay` s in the past. The yaw bank advances by the period at
         the horizon; airspeed m/s, 0 = unknown.
         """
-        finish_period(
-            self.state, self._history, f.x, imu.delta_angle, imu.delta_velocity,
-            imu.delta_angle_dt, imu.delta_velocity_dt, f.dt_imu_avg, f.dt_avg, delay, bank.models,
-            f.imu.increments, airspeed)
+        self._finish_period(self.state, self._history, f.x, raw, f.dt_imu_avg, f.dt_avg, delay,
+                            bank.models, f.imu.increments, airspeed)
 
     def velocity_at_origin(self, imu_position: Array) -> Array:
         """Return the velocity (3,) of the body origin, given the IMU position (3,) in the body."""

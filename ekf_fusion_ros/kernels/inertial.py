@@ -21,11 +21,13 @@ ties of this sum, and agreement with the reference filter needs the same ties.""
 
 INERTIAL = np.dtype([
     ('quat', 'f8', (4,)), ('velocity', 'f8', (3,)), ('clock', 'f4', (2,)), ('sums', 'f8', (1,)),
-    ('period', 'f8', (8,)), ('previous', 'f8', (6,)), ('vibration', 'f8', (3,)),
-    ('limits', 'f8', (3,)), ('mean_dt', 'f8', (1,)), ('times', 'i8', (3,))])
-"""What down-sampling and vibration metrics keep between raw samples; the last complete period; the
-limits of rest: angle vibration in rad, velocity vibration in m/s, rate in rad/s; mean interval of
-raw samples in s; times of the last sample, motion and vibration in us."""
+    ('period', 'f8', (8,)), ('raw', 'f8', (8,)), ('previous', 'f8', (6,)),
+    ('vibration', 'f8', (3,)), ('limits', 'f8', (3,)), ('mean_dt', 'f8', (1,)),
+    ('times', 'i8', (3,))])
+"""What down-sampling and vibration metrics keep between raw samples; the last complete period and
+the newest raw sample, each delta angle (3), delta velocity (3) and both intervals; the limits of
+rest: angle vibration in rad, velocity vibration in m/s, rate in rad/s; mean interval of raw
+samples in s; times of the last sample, motion and vibration in us."""
 
 LAST, LAST_MOTION, LAST_VIBRATION = 0, 1, 2
 """Entries of `times`."""
@@ -92,16 +94,17 @@ def accumulate_imu(
 
 @kernel
 def take_imu(
-    state: NDArray[np.void], time_us: int, delta_angle: Array, delta_velocity: Array,
-    angle_dt: float, velocity_dt: float, in_air: bool,
+    state: NDArray[np.void], time_us: int, in_air: bool,
 ) -> bool:
-    """Run update_vibration and accumulate_imu on one raw sample; state is one INERTIAL.
+    """Run update_vibration and accumulate_imu on the raw sample of one INERTIAL.
 
     Motion is any flight, vibration or turn beyond the limits of rest. True where the sample
     completed a filter period.
     """
     s = state[0]
     metrics, limits, times = s['vibration'], s['limits'], s['times']
+    raw = s['raw']
+    delta_angle, delta_velocity = raw[0:3], raw[3:6]
     dt = min(max(1e-6 * (time_us - times[LAST]), DT_MIN), DT_MAX)
     times[LAST] = time_us
     s['mean_dt'][0] = 0.8 * s['mean_dt'][0] + 0.2 * dt
@@ -113,8 +116,8 @@ def take_imu(
         times[LAST_VIBRATION] = time_us
     elif in_air:
         times[LAST_MOTION] = time_us
-    return accumulate_imu(delta_angle, delta_velocity, angle_dt, velocity_dt, s['quat'],
-                          s['velocity'], s['clock'], s['sums'], s['period'])
+    return accumulate_imu(delta_angle, delta_velocity, raw[6], raw[7], s['quat'], s['velocity'],
+                          s['clock'], s['sums'], s['period'])
 
 
 @kernel

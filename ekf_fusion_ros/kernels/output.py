@@ -33,14 +33,13 @@ constants of velocity and position in s, the periods so far. It runs once it has
 
 @kernel
 def propagate_predictor(
-    state: NDArray[np.void], delta_angle: Array, delta_velocity: Array, angle_dt: float,
-    velocity_dt: float, x: Array, bias_scale: float,
+    state: NDArray[np.void], raw: Array, x: Array, bias_scale: float,
 ) -> None:
-    """Run propagate_output on one OUTPUT, if it is running."""
+    """Run propagate_output on one OUTPUT over a raw sample (8,), if it is running."""
     s = state[0]
     if s['running'] != 0.0:
-        propagate_output(s['now'], s['rot'], delta_angle, delta_velocity, angle_dt, velocity_dt, x,
-                         bias_scale, s['correction'], s['yaw'], s['rate'], s['acceleration'])
+        propagate_output(s['now'], s['rot'], raw[0:3], raw[3:6], raw[6], raw[7], x, bias_scale,
+                         s['correction'], s['yaw'], s['rate'], s['acceleration'])
 
 
 @kernel

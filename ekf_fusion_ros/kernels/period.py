@@ -34,10 +34,13 @@ def take_raw(
     dt_avg mean filter period in s. The output of a sample that completes a period waits for the
     update of the filter (finish_period). True where it did; see take_imu and propagate_predictor.
     """
-    if take_imu(inertial, time_us, delta_angle, delta_velocity, angle_dt, velocity_dt, in_air):
+    raw = inertial[0]['raw']
+    raw[0:3] = delta_angle
+    raw[3:6] = delta_velocity
+    raw[6], raw[7] = angle_dt, velocity_dt
+    if take_imu(inertial, time_us, in_air):
         return True
-    propagate_predictor(output, delta_angle, delta_velocity, angle_dt, velocity_dt, x,
-                        inertial[0]['mean_dt'][0] / dt_avg)
+    propagate_predictor(output, raw, x, inertial[0]['mean_dt'][0] / dt_avg)
     return False
 
 
@@ -98,16 +101,14 @@ def select_accel_biases(
 
 @kernel
 def finish_period(
-    output: Record, history: Array, x: Array, delta_angle: Array, delta_velocity: Array,
-    angle_dt: float, velocity_dt: float, dt_imu_avg: float, dt_avg: float, delay: float,
-    bank: Record, imu: Array, airspeed: float,
+    output: Record, history: Array, x: Array, raw: Array, dt_imu_avg: float, dt_avg: float,
+    delay: float, bank: Record, imu: Array, airspeed: float,
 ) -> None:
-    """Carry the output over the raw sample that completed the period and correct it.
+    """Carry the output over the raw sample (8,) that completed the period and correct it.
 
     See correct_predictor. The models of the yaw bank, one BANK, advance over the period imu (8,)
     at the horizon.
     """
-    propagate_predictor(output, delta_angle, delta_velocity, angle_dt, velocity_dt, x,
-                        dt_imu_avg / dt_avg)
+    propagate_predictor(output, raw, x, dt_imu_avg / dt_avg)
     correct_predictor(output, history, x, dt_imu_avg, dt_avg, delay)
     advance_bank(bank, imu, airspeed)
