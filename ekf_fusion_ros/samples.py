@@ -22,6 +22,7 @@ UNTOLD_POSITION_VAR = np.full(3, 0.1)
 UNTOLD_POSITION_VAR.flags.writeable = False
 UNTOLD_VELOCITY_COV = 0.1 * np.eye(3)
 UNTOLD_VELOCITY_COV.flags.writeable = False
+NO_CLIPPING = (False, False, False)
 
 
 class VelocityFrame(Enum):
@@ -45,7 +46,7 @@ class ImuSample(NamedTuple):
     delta_velocity: Array
     delta_angle_dt: float
     delta_velocity_dt: float
-    clipping: tuple[bool, bool, bool] = (False, False, False)
+    clipping: tuple[bool, bool, bool] = NO_CLIPPING
     orientation: Array | None = None
 
 

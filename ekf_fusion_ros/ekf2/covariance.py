@@ -29,10 +29,10 @@ from ekf_fusion_ros.kernels.update import apply_update
 from ekf_fusion_ros.kernels.update import fuse_state
 from ekf_fusion_ros.kernels.update import fuse_two_states
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
+from ekf_fusion_ros.samples import NO_CLIPPING
 
 Array = NDArray[np.float64]
 
-NO_AXES = (False, False, False)
 ALL_AXES = (True, True, True)
 BAD_ACCEL_NOISE = 4.9
 """Accelerometer noise in m/s^2 while it clips or contradicts the height aiding."""
@@ -57,7 +57,7 @@ class Covariance:
         self._mag_active = False
         self.limits[ACCEL_BIAS_VARIANCE_MAX] = (0.1 * GRAVITY * FILTER_PERIOD) ** 2
         imu = params.imu
-        self._bad_axes = NO_AXES
+        self._bad_axes = NO_CLIPPING
         self._process = np.zeros(1, PROCESS)
         process = self._process[0]
         self.accel_lpf: Array = process['accel_lpf']
@@ -99,7 +99,7 @@ class Covariance:
         if bad_axes != self._bad_axes:
             self._bad_axes = bad_axes
             self._set_velocity_noise()
-        clipped = 0 if clipping == NO_AXES else sum(c << k for k, c in enumerate(clipping))
+        clipped = 0 if clipping == NO_CLIPPING else sum(c << k for k, c in enumerate(clipping))
         outcome: tuple[float, float, bool] = self._predict(
             x, self.p, rot, imu.increments, earth_rate, self.limits, self._process, dt_avg,
             in_air, bad_accel or self._learns_no_accel_bias, clipped)

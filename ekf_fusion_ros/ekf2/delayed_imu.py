@@ -7,8 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-NO_CLIPPING = (False, False, False)
-
 
 class DelayedImu(NamedTuple):
     """One filter period of inertial data: delta angle (3), delta velocity (3), both intervals."""

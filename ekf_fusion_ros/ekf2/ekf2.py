@@ -17,7 +17,6 @@ from ekf_fusion_ros.buffer import SampleBuffer
 from ekf_fusion_ros.ekf2.accel_bias_check import AccelBiasCheck
 from ekf_fusion_ros.ekf2.alignment import Alignment
 from ekf_fusion_ros.ekf2.control import Control
-from ekf_fusion_ros.ekf2.delayed_imu import NO_CLIPPING
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.ground_contact import GroundContact
 from ekf_fusion_ros.ekf2.inertial_input import InertialInput
@@ -32,6 +31,7 @@ from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import NavState
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 from ekf_fusion_ros.params.spec import validate
+from ekf_fusion_ros.samples import NO_CLIPPING
 from ekf_fusion_ros.samples import AirspeedSample
 from ekf_fusion_ros.samples import AuxVelocitySample
 from ekf_fusion_ros.samples import BaroSample

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.covariance import Covariance
-from ekf_fusion_ros.ekf2.delayed_imu import NO_CLIPPING
 from ekf_fusion_ros.ekf2.delayed_imu import DelayedImu
 from ekf_fusion_ros.ekf2.earth import EarthReference
 from ekf_fusion_ros.ekf2.events import EventLog
@@ -23,6 +22,7 @@ from ekf_fusion_ros.ekf2.state import FILTER_PERIOD
 from ekf_fusion_ros.ekf2.state import SIZE
 from ekf_fusion_ros.observation import Observation
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
+from ekf_fusion_ros.samples import NO_CLIPPING
 from ekf_fusion_ros.samples import AirspeedSample
 from ekf_fusion_ros.samples import Antenna
 from ekf_fusion_ros.samples import VisionSample

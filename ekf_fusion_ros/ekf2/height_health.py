@@ -5,13 +5,13 @@ from __future__ import annotations
 from ekf_fusion_ros.ekf2.aid_sources.barometer import Barometer
 from ekf_fusion_ros.ekf2.aid_sources.gnss import Gnss
 from ekf_fusion_ros.ekf2.aid_sources.vision import Vision
-from ekf_fusion_ros.ekf2.delayed_imu import NO_CLIPPING
 from ekf_fusion_ros.ekf2.events import EventKind
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.height_source import HeightSource
 from ekf_fusion_ros.ekf2.range_height import RangeHeight
 from ekf_fusion_ros.ekf2.state import PD
 from ekf_fusion_ros.ekf2.state import SECOND
+from ekf_fusion_ros.samples import NO_CLIPPING
 
 TIMEOUT_US = 5 * SECOND
 BAD_ACCEL_RESET_US = SECOND // 2

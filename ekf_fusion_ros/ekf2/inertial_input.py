@@ -7,12 +7,12 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
-from ekf_fusion_ros.ekf2.delayed_imu import NO_CLIPPING
 from ekf_fusion_ros.ekf2.delayed_imu import DelayedImu
 from ekf_fusion_ros.ekf2.output_predictor import OutputPredictor
 from ekf_fusion_ros.ekf2.state import SECOND
 from ekf_fusion_ros.kernels.inertial import INERTIAL
 from ekf_fusion_ros.kernels.period import take_raw
+from ekf_fusion_ros.samples import NO_CLIPPING
 from ekf_fusion_ros.samples import ImuSample
 
 Array = NDArray[np.float64]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import repeat
 from typing import Any
 from typing import NamedTuple
 
@@ -26,6 +27,7 @@ from ekf_fusion_ros.messages.stamps import plain_stamps
 from ekf_fusion_ros.params.messages import ZERO
 from ekf_fusion_ros.params.messages import ImuMessageParams
 from ekf_fusion_ros.params.messages import MessageParams
+from ekf_fusion_ros.samples import NO_CLIPPING
 from ekf_fusion_ros.samples import ImuSample
 
 Array = NDArray[np.float64]
@@ -106,13 +108,13 @@ def decode_imu_rows(rows: FlatRows, params: MessageParams) -> list[ImuReading | 
     # Most readings follow the one before them here, so that their increments are known already.
     intervals = np.diff(times, prepend=times[:1]) * 1e-6
     angles, velocities = rates * intervals[:, None], forces * intervals[:, None]
-    before_us = [-1, *times[:-1].tolist()]
-    return [ImuReading(time_us, rate, force, orientation, ImuSample(
-                time_us, angle, velocity, dt, dt, orientation=orientation), since_us)
-            if plain else None
-            for plain, time_us, rate, force, orientation, angle, velocity, dt, since_us in zip(
-                good.tolist(), times.tolist(), rates, forces, orientations, angles, velocities,
-                intervals.tolist(), before_us, strict=True)]
+    stamps, dt = times.tolist(), intervals.tolist()
+    increments = map(ImuSample._make, zip(
+        stamps, angles, velocities, dt, dt, repeat(NO_CLIPPING), orientations, strict=False))
+    readings = map(ImuReading._make, zip(
+        stamps, rates, forces, orientations, increments, [-1, *stamps[:-1]], strict=True))
+    return [reading if plain else None
+            for plain, reading in zip(good.tolist(), readings, strict=True)]
 
 
 def _flat(message: Any) -> FlatMessage:

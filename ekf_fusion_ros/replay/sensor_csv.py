@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ekf_fusion_ros.samples import NO_CLIPPING
 from ekf_fusion_ros.samples import AirspeedSample
 from ekf_fusion_ros.samples import AuxVelocitySample
 from ekf_fusion_ros.samples import BaroSample
@@ -108,7 +109,7 @@ class _ImuRows:
         self._last_us = time_us
         # single precision as the reference filter has it: ties in the down-sampler hang on it
         dt = float(np.float32(np.float32(gap) * np.float32(1e-6)))
-        clipping = (v[6] != 0, v[7] != 0, v[8] != 0) if len(v) > 8 else (False, False, False)
+        clipping = (v[6] != 0, v[7] != 0, v[8] != 0) if len(v) > 8 else NO_CLIPPING
         return ImuSample(time_us, np.array(v[3:6]) * dt, np.array(v[0:3]) * dt, dt, dt, clipping)
 
 
