@@ -15,6 +15,7 @@ from ekf_fusion_ros.pairing import with_velocity
 from ekf_fusion_ros.roles import FIX_OF_PART
 from ekf_fusion_ros.roles import FIX_VELOCITY
 from ekf_fusion_ros.roles import FIX_VELOCITY_2
+from ekf_fusion_ros.roles import FIX_VELOCITY_3
 from ekf_fusion_ros.roles import GPS_HEADING
 from ekf_fusion_ros.samples import GnssSample
 from ekf_fusion_ros.statistics import RoleStatistics
@@ -26,7 +27,8 @@ RELEASE_US = 20_000
 """Time that the way of a fix from here to the filter may take, two of its periods."""
 
 JOINS: dict[str, Callable[..., GnssSample]] = {
-    FIX_VELOCITY: with_velocity, GPS_HEADING: with_heading, FIX_VELOCITY_2: with_velocity}
+    FIX_VELOCITY: with_velocity, GPS_HEADING: with_heading, FIX_VELOCITY_2: with_velocity,
+    FIX_VELOCITY_3: with_velocity}
 
 
 class FixAssembly:

@@ -34,8 +34,10 @@ from ekf_fusion_ros.roles import ARMED
 from ekf_fusion_ros.roles import AUX_VELOCITY
 from ekf_fusion_ros.roles import FIX
 from ekf_fusion_ros.roles import FIX_2
+from ekf_fusion_ros.roles import FIX_3
 from ekf_fusion_ros.roles import FIX_VELOCITY
 from ekf_fusion_ros.roles import FIX_VELOCITY_2
+from ekf_fusion_ros.roles import FIX_VELOCITY_3
 from ekf_fusion_ros.roles import FLOW
 from ekf_fusion_ros.roles import GPS_HEADING
 from ekf_fusion_ros.roles import IMU
@@ -67,6 +69,8 @@ DECODERS: dict[str, Callable[..., Any]] = {
     IMU: decode_imu,
     FIX_2: decode_fix,
     FIX_VELOCITY_2: decode_fix_velocity,
+    FIX_3: decode_fix,
+    FIX_VELOCITY_3: decode_fix_velocity,
     MAGNETIC_FIELD: decode_magnetic_field,
     PRESSURE: decode_pressure,
     RANGE: decode_range,
@@ -111,8 +115,10 @@ JUMPS = {
 def decoder_of(role: str, params: Params) -> Callable[[Any], Any]:
     """Return the function that turns a message of `role` into a stamped sample."""
     messages = params.messages
-    if role in (FIX_2, FIX_VELOCITY_2):
-        messages = replace(messages, fix=messages.fix_2, fix_velocity=messages.fix_velocity_2)
+    if DECODERS[role] is decode_fix:
+        messages = replace(messages, fix=getattr(messages, role))
+    if DECODERS[role] is decode_fix_velocity:
+        messages = replace(messages, fix_velocity=getattr(messages, role))
     return partial(DECODERS[role], params=messages)
 
 

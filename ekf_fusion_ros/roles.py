@@ -33,20 +33,25 @@ AUX_VELOCITY = 'aux_velocity'
 ARMED = 'armed'
 FIX_2 = 'fix_2'
 FIX_VELOCITY_2 = 'fix_velocity_2'
+FIX_3 = 'fix_3'
+FIX_VELOCITY_3 = 'fix_velocity_3'
 
 SUPPORTED = (
     ODOMETRY, FIX, FIX_VELOCITY, IMU, MAGNETIC_FIELD, PRESSURE, RANGE, FLOW, AIRSPEED, LANDED,
-    GPS_HEADING, AUX_VELOCITY, ARMED, FIX_2, FIX_VELOCITY_2)
+    GPS_HEADING, AUX_VELOCITY, ARMED, FIX_2, FIX_VELOCITY_2, FIX_3, FIX_VELOCITY_3)
 WITHOUT_STAMP = (LANDED, ARMED)
 """Roles whose messages act when they come."""
 
-FIXES = (FIX, FIX_2)
+FIXES = (FIX, FIX_2, FIX_3)
 """One role for each receiver; the first leads where one must: its delay, its fix at the start."""
 
-FIX_OF_PART = {FIX_VELOCITY: FIX, GPS_HEADING: FIX, FIX_VELOCITY_2: FIX_2}
+FIX_OF_PART = {FIX_VELOCITY: FIX, GPS_HEADING: FIX, FIX_VELOCITY_2: FIX_2, FIX_VELOCITY_3: FIX_3}
 """Roles whose messages belong to the fix of the same stamp, and the role of that fix."""
 
 PARTS_OF_FIX = tuple(FIX_OF_PART)
+
+NEEDED = {**dict.fromkeys(FIXES[1:], FIX), **FIX_OF_PART}
+"""Roles that need another beside them, and which."""
 
 # Where ekf2 keeps the delay of a role.
 DELAYS = {
@@ -71,7 +76,7 @@ def check_roles(roles: Collection[str]) -> None:
             raise ValueError(f'unknown role {role!r}: choose of {", ".join(SUPPORTED)}')
     if IMU not in roles and ODOMETRY not in roles:
         raise ValueError('no inertial input: give an odometry or an imu topic')
-    for role, fix in ((FIX_2, FIX), *FIX_OF_PART.items()):
+    for role, fix in NEEDED.items():
         if role in roles and fix not in roles:
             raise ValueError(f'role {role} needs a {fix} topic beside it')
 

@@ -15,8 +15,8 @@ from launch_ros.actions import Node
 
 TOPICS = (
     'odom', 'fix', 'imu', 'fix_velocity', 'mag', 'pressure', 'range', 'flow', 'airspeed', 'landed',
-    'armed', 'gps_heading', 'aux_velocity', 'fix_2', 'fix_velocity_2', 'odometry/filtered',
-    'odometry/gps', 'gps/filtered')
+    'armed', 'gps_heading', 'aux_velocity', 'fix_2', 'fix_velocity_2', 'fix_3', 'fix_velocity_3',
+    'odometry/filtered', 'odometry/gps', 'gps/filtered')
 
 ARGUMENTS = {
     'preset': ('', 'File of config/ for a source of odometry, without .yaml: vins_fusion, '

@@ -23,6 +23,7 @@ GROUPS = {
     'magnetic_field': ('magnetic_field', ''),
     'range': ('range', 'range'),
     'fix_2': ('fix_2', ''),
+    'fix_3': ('fix_3', ''),
 }
 """Groups of `messages` and of `ekf2` that hold the mounting of a role."""
 

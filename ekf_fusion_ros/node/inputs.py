@@ -47,6 +47,8 @@ TOPICS = {
     'aux_velocity': ('aux_velocity', TwistWithCovarianceStamped),
     'fix_2': ('fix_2', NavSatFix),
     'fix_velocity_2': ('fix_velocity_2', TwistWithCovarianceStamped),
+    'fix_3': ('fix_3', NavSatFix),
+    'fix_velocity_3': ('fix_velocity_3', TwistWithCovarianceStamped),
 }
 # Messages other than the usual ones, by the word in node.<role>_type.
 OTHER_TYPES = {'twist': TwistStamped, 'pose': PoseStamped, 'imu': Imu}

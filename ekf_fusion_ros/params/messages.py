@@ -225,6 +225,8 @@ class MessageParams:
     fix_velocity: FixVelocityMessageParams = field(default_factory=FixVelocityMessageParams)
     fix_2: FixMessageParams = field(default_factory=FixMessageParams)
     fix_velocity_2: FixVelocityMessageParams = field(default_factory=FixVelocityMessageParams)
+    fix_3: FixMessageParams = field(default_factory=FixMessageParams)
+    fix_velocity_3: FixVelocityMessageParams = field(default_factory=FixVelocityMessageParams)
     imu: ImuMessageParams = field(default_factory=ImuMessageParams)
     magnetic_field: MagneticFieldMessageParams = field(
         default_factory=MagneticFieldMessageParams)

@@ -51,6 +51,13 @@ class NodeParams:
     fix_velocity_2_type: str = param(
         'twist_with_covariance', 'Message of `fix_velocity_2`: TwistWithCovarianceStamped or '
         'TwistStamped.', choices=TWIST_TYPES)
+    use_fix_3: bool = param(
+        False, 'Subscribe to `fix_3`, a third receiver: all are blended.', live=True)
+    use_fix_velocity_3: bool = param(
+        False, 'Subscribe to `fix_velocity_3`, the velocity of the third receiver.', live=True)
+    fix_velocity_3_type: str = param(
+        'twist_with_covariance', 'Message of `fix_velocity_3`: TwistWithCovarianceStamped or '
+        'TwistStamped.', choices=TWIST_TYPES)
     use_aux_velocity: bool = param(
         False, 'Subscribe to `aux_velocity` (velocity against a target at rest, ENU).', live=True)
     aux_velocity_type: str = param(

@@ -22,6 +22,7 @@ class ReceiversParams:
     """Two or more receivers blended into one; without effect where there is only `fix`."""
 
     fix_2: FurtherReceiverParams = field(default_factory=FurtherReceiverParams)
+    fix_3: FurtherReceiverParams = field(default_factory=FurtherReceiverParams)
     wait_ms: float = param(
         80.0, 'Time by inertial stamps that a fix waits for those of the other receivers; less '
         'where the fusion horizon could not take it any more.', unit='ms', min=0, max=1000)

@@ -81,7 +81,8 @@ def _parser() -> argparse.ArgumentParser:
     add('--end', type=_seconds, metavar='S', help='end S seconds after the start')
     add('--withhold', action='append', default=[], metavar='ROLE=S:E[,S:E...]',
         help='keep messages of a role from the filter in windows of stamps, in seconds after '
-        'the start; fix withholds fix_velocity and gps_heading too, fix_2 fix_velocity_2')
+        'the start; fix withholds fix_velocity and gps_heading too, fix_2 fix_velocity_2, '
+        'fix_3 fix_velocity_3')
     add('--estimator', metavar='NAME[,NAME...]',
         help='estimator in place of the parameter; several run one after the other, each into a '
         'folder of its name, and are compared')

@@ -42,14 +42,15 @@ GPS_AND_ALL_ELSE = 15
 UNMEASURED = 1e6
 INFRARED = 1
 BEST_FLOW = 255.0
-SUFFIXES = {'fix_2': '_2'}
+SUFFIXES = {'fix_2': '_2', 'fix_3': '_3'}
 
 
 def write_recording(path: Path, arrivals: Iterable[tuple[int, str, Sample]]) -> dict[str, int]:
     """Write samples to a new rosbag2 folder (MCAP); return the messages per topic.
 
-    arrivals: log time in us, role, sample. The topics of a second receiver end in _2 as its role
-    does; of other samples the type says the topic. Raises WriterError where the folder exists.
+    arrivals: log time in us, role, sample. The topics of a further receiver end as its role
+    does, in _2 or _3; of other samples the type says the topic. Raises WriterError where the
+    folder exists.
     """
     store = get_typestore(Stores.ROS2_JAZZY)
     messages = _Messages(store.types)

@@ -33,6 +33,9 @@ TYPES: dict[str, tuple[str, ...]] = {
     roles.FIX_2: ('sensor_msgs/msg/NavSatFix',),
     roles.FIX_VELOCITY_2: (
         'geometry_msgs/msg/TwistWithCovarianceStamped', 'geometry_msgs/msg/TwistStamped'),
+    roles.FIX_3: ('sensor_msgs/msg/NavSatFix',),
+    roles.FIX_VELOCITY_3: (
+        'geometry_msgs/msg/TwistWithCovarianceStamped', 'geometry_msgs/msg/TwistStamped'),
 }
 ALL_TYPES = frozenset(kind for kinds in TYPES.values() for kind in kinds)
 WITH_ODOMETRY = (roles.ODOMETRY, roles.FIX)
@@ -42,6 +45,7 @@ WITHOUT_ODOMETRY = (
 NAMES = {
     roles.FIX_VELOCITY: ('fix', 'gps', 'gnss', 'navsat'),
     roles.FIX_VELOCITY_2: ('fix', 'gps', 'gnss', 'navsat'),
+    roles.FIX_VELOCITY_3: ('fix', 'gps', 'gnss', 'navsat'),
     roles.FLOW: ('flow',),
     roles.AIRSPEED: ('airspeed', 'air_speed', 'pitot'),
     roles.LANDED: ('landed', 'on_ground', 'ground_contact'),
@@ -49,6 +53,12 @@ NAMES = {
     roles.GPS_HEADING: ('heading',),
     roles.AUX_VELOCITY: ('aux_velocity', 'landing_target', 'target_velocity'),
 }
+FURTHER = {
+    roles.FIX: (roles.FIX_2, roles.FIX_3),
+    roles.FIX_VELOCITY: (roles.FIX_VELOCITY_2, roles.FIX_VELOCITY_3),
+}
+"""Roles of the same kind of topic of further receivers."""
+
 # Outputs of a fusion, this one's among them, are not its inputs.
 OUTPUT_NAMES = ('odometry/filtered', 'odometry/gps', 'gps/filtered')
 
@@ -91,7 +101,7 @@ def choose(
         free = [topic for topic in candidates[role] if topic.name not in taken]
         if role not in wanted and free:
             choice.topics[role] = free[0]
-    for role, fix in ((roles.FIX_2, roles.FIX), *roles.FIX_OF_PART.items()):
+    for role, fix in roles.NEEDED.items():
         if fix not in choice.topics and role not in wanted:
             choice.topics.pop(role, None)
     choice.topics = {role: choice.topics[role] for role in TYPES if role in choice.topics}
@@ -157,8 +167,9 @@ def _remark(choice: Choice, available: Mapping[str, Topic], wanted: Mapping[str,
 
 
 def _beside(role: str, topic: Topic, choice: Choice) -> str:
-    """Say how a topic of a second receiver joins the first."""
-    second = {roles.FIX: roles.FIX_2, roles.FIX_VELOCITY: roles.FIX_VELOCITY_2}.get(role)
-    if role not in choice.topics or second is None or second in choice.topics:
+    """Say how a topic of a further receiver joins those in use."""
+    further = FURTHER.get(role, ())
+    free = next((one for one in further if one not in choice.topics), None)
+    if role not in choice.topics or free is None:
         return ''
-    return f', beside it with --topic {second}={topic.name}'
+    return f', beside it with --topic {free}={topic.name}'

@@ -35,7 +35,7 @@ ORIGIN = GeoPoint(47.397742, 8.545594, 488.0)
 START_US = 1_700_000_000_000_000
 ROLES = ('odometry', 'fix', 'imu', 'magnetic_field', 'pressure')
 FURTHER_ROLES = ('range', 'flow', 'airspeed', 'landed', 'aux_velocity', 'armed')
-FURTHER_RECEIVERS = ('fix_2',)
+FURTHER_RECEIVERS = ('fix_2', 'fix_3')
 ARMED_AT = 15.0
 """Time in s at which a simulated vehicle is armed: the estimate has settled by then."""
 
@@ -109,6 +109,7 @@ def default_sensors(
         'aux_velocity': AuxiliaryVelocity(),
         'armed': Arming(armed_at=ARMED_AT),
         'fix_2': Gnss(origin=origin),
+        'fix_3': Gnss(origin=origin),
     }
     return {role: everything[role] for role in roles if role != GPS_HEADING}
 

@@ -115,7 +115,7 @@ def test_further_roles_listen_to_the_message_that_is_chosen(start_fuser: StartFu
                  'gps_heading: PoseStamped on /gps_heading'):
         assert line in fuser.output
     unused = ('imu, fix_velocity, magnetic_field, pressure, armed, aux_velocity, fix_2, '
-              'fix_velocity_2')
+              'fix_velocity_2, fix_3, fix_velocity_3')
     assert f'not listening to {unused}:' in fuser.output
 
 

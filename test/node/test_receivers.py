@@ -1,4 +1,4 @@
-"""Two receivers through the node: both heard, blended, told of in diagnostics."""
+"""Three receivers through the node: all heard, blended, told of in diagnostics."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.slow
 
 
-def test_a_second_receiver_joins(start_fuser: Callable[..., Fuser], peer: Peer) -> None:
-    fuser = start_fuser({'node.use_fix_2': True})
+def test_further_receivers_join(start_fuser: Callable[..., Fuser], peer: Peer) -> None:
+    fuser = start_fuser({'node.use_fix_2': True, 'node.use_fix_3': True})
     diagnostics: list[DiagnosticArray] = hear(peer, DiagnosticArray, '/diagnostics')
-    peer.connect(fuser, {**TWO_TOPICS, 'fix_2': NavSatFix})
+    peer.connect(fuser, {**TWO_TOPICS, 'fix_2': NavSatFix, 'fix_3': NavSatFix})
     for k in range(600):
         peer.publish('odom', odometry(0.1 * k))
         if k % 2 == 0:
-            peer.publish('fix', fix(0.1 * k))
-            peer.publish('fix_2', fix(0.1 * k))
+            for role in ('fix', 'fix_2', 'fix_3'):
+                peer.publish(role, fix(0.1 * k))
         if k % 50 == 49:
             # a best-effort input keeps 200 messages: no faster than they are taken
             peer.until(lambda sent=k + 1: peer.count('odometry') >= sent, fuser)
@@ -40,6 +40,6 @@ def test_a_second_receiver_joins(start_fuser: Callable[..., Fuser], peer: Peer) 
         told = {status.name: status.message for array in diagnostics[-1:]
                 for status in array.status}
         return all(told.get(f'fuser: receiver {role}', '').startswith(
-            'in the blend: position 50 %') for role in ('fix', 'fix_2'))
+            'in the blend: position 33 %') for role in ('fix', 'fix_2', 'fix_3'))
 
     peer.until(lambda: bool(peer.odometry) and blended(), fuser)

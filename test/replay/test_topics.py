@@ -110,6 +110,9 @@ def test_a_second_receiver_is_offered_and_never_plays_both_roles():
     line, = [line for line in choose(two).lines() if 'left out' in line]
     assert line.endswith('beside it with --topic fix_2=/right/fix')
     assert names(choose(two, fix_2='/left/fix'))['fix'] == '/right/fix'
+    three = two | recording(('/top/fix', FIX, 7))
+    line, = [line for line in choose(three, fix_2='/right/fix').lines() if 'left out' in line]
+    assert line.endswith('beside it with --topic fix_3=/top/fix')
     choice = topics.choose(two, {}, 'flight', ('fix_2',))
     assert names(choice) == {'odometry': '/odom', 'fix': '/left/fix', 'fix_2': '/right/fix'}
     one = recording(('/odom', ODOM, 90), ('/fix', FIX, 9))

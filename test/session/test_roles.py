@@ -72,6 +72,7 @@ def test_mounting_of_the_messages_becomes_the_lever_arm():
     (('imu', 'gyroscope'), 'unknown role'),
     (('imu', 'fix_2'), 'role fix_2 needs a fix topic'),
     (('imu', 'fix', 'fix_velocity_2'), 'role fix_velocity_2 needs a fix_2 topic'),
+    (('imu', 'fix', 'fix_2', 'fix_velocity_3'), 'role fix_velocity_3 needs a fix_3 topic'),
 ])
 def test_roles_that_cannot_be_fused(roles, word):
     with pytest.raises(ValueError, match=word):
