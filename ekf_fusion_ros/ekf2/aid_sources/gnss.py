@@ -322,9 +322,23 @@ class Gnss:
             fuse_vertical_velocity(f, f.observations.gps_ver_vel, velocity_innovation[2],
                                    noise * VERTICAL_NOISE_RATIO ** 2, params.vel_gate)
             self._adapt_accel_noise()
-        noise = self._position_sigma(fix.hacc) ** 2 * self._repetition(fix.time_us)
+        stated = self._position_sigma(fix.hacc) ** 2
+        noise = stated * self._repetition(fix.time_us)
         fuse_horizontal_position(f, f.observations.gps_hor_pos, position_innovation,
-                                 (noise, noise), params.pos_gate)
+                                 (noise, noise), self._position_gate(stated, noise))
+
+    def _position_gate(self, stated: float, noise: float) -> float:
+        """Return the gate in sigmas of a fix that is fused with more noise than it states, in m^2.
+
+        Correlated errors tell less than white ones but are no larger: an innovation has the
+        variance that state and fix have by themselves.
+        """
+        f = self._f
+        gate = f.params.gnss.pos_gate
+        if noise == stated:
+            return gate
+        variance = 0.5 * (f.cov.p.item(7, 7) + f.cov.p.item(8, 8))
+        return gate * math.sqrt((variance + stated) / (variance + noise))
 
     def _repetition(self, time_us: int) -> float:
         """Return how many fixes tell as much as one whose errors are independent.

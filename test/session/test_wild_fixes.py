@@ -1,0 +1,45 @@
+"""Odometry and fixes alone: fixes that are wrong for a moment are not followed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+
+import numpy as np
+import pytest
+
+from ekf_fusion_ros.params import Params
+from ekf_fusion_ros.session import FusionSession
+from ekf_fusion_ros.simulation.scenario import Scenario
+from ekf_fusion_ros.simulation.scenario import default_sensors
+from ekf_fusion_ros.simulation.trajectory import Flight
+
+SECONDS = 110.0
+WRONG_FROM = 90.0
+EARTH_RADIUS = 6.371e6
+
+
+def tracks(rate, seed, wrong_for, wrong_by):
+    """Return the time (N,) in s, and the position NE (N, 2) without and with wrong fixes."""
+    sensors = default_sensors(('odometry', 'fix'))
+    sensors['fix'] = replace(sensors['fix'], rate=rate)
+    flight = Scenario(trajectory=Flight(duration=SECONDS, height=15.0), sensors=sensors, seed=seed)
+    both = []
+    for shift in (0.0, wrong_by):
+        session, rows = FusionSession(Params(), ['odometry', 'fix']), []
+        for arrival in flight.arrivals():
+            sample, seconds = arrival.sample, 1e-6 * (arrival.time_us - flight.start_us)
+            if arrival.role == 'fix' and WRONG_FROM <= seconds < WRONG_FROM + wrong_for:
+                sample = sample._replace(lat=sample.lat + math.degrees(shift / EARTH_RADIUS))
+            rows += [(output.nav.time_us, *output.nav.position[0:2])
+                     for output in session.push(sample)]
+        both.append(np.array(rows))
+    return 1e-6 * (both[0][:, 0] - flight.start_us), both[0][:, 1:], both[1][:, 1:]
+
+
+@pytest.mark.parametrize('rate', [1.0, 5.0, 10.0])
+@pytest.mark.parametrize('seed', [1, 2])
+def test_a_fix_that_is_off_for_less_than_a_second_is_refused(rate, seed):
+    time, without, with_wrong = tracks(rate, seed, wrong_for=0.9, wrong_by=25.0)
+    moved = np.abs(with_wrong - without).max(axis=1)
+    assert moved[time > WRONG_FROM].max() < 1.0
