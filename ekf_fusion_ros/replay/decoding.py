@@ -72,6 +72,7 @@ def _decoder(
             # Damaged bytes can make the reader raise anything.
             return role, Refused('undecodable', f'{len(data)} bytes are no {kind} ({error})')
         if withheld and withholding.holds(role, _stamp_us(message, log_time_ns)):
+            withholding.keep(decode(role, message))
             return role, Refused('withheld', '')
         return role, decode(role, message)
 

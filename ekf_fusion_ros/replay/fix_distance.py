@@ -1,7 +1,8 @@
-"""How far the track passes by the fixes that were used."""
+"""How far the track passes by fixes, those that were used or those that were withheld."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from collections.abc import Sequence
 import math
 from typing import Any
@@ -25,7 +26,7 @@ LIMIT_SIGMAS, LIMIT_MARGIN = 3.0, 2.0
 
 
 class FixDistance:
-    """Horizontal distance in m from each used fix to the causal track, at the time of the fix.
+    """Horizontal distance in m from each fix to the causal track, at the time of the fix.
 
     The track is that before the fix was known: what it corrects comes later. A fix counts at its
     stamp less the delay of the receiver. Beyond three of its sigmas plus 2 m it is over the limit.
@@ -37,20 +38,26 @@ class FixDistance:
         self._kind = params.ekf2.earth.projection
         self._projection: tuple[GeoPoint, Projection] | None = None
         self._recent = np.zeros((0, 3))
+        self._waiting: list[GnssSample] = []
         self._count = 0
         self._over = 0
         self._sum = 0.0
         self._largest = 0.0
 
-    def note(self, rows: Sequence[FusedOutput]) -> None:
-        """Take rows of the track with the fixes that came with them."""
+    def note(self, rows: Sequence[FusedOutput], fixes: Iterable[GnssSample]) -> None:
+        """Take the next rows of the track and fixes, which wait until the track reaches them."""
+        self._waiting += fixes
         if not rows:
             return
         newest = [(row.time_us, *row.nav.position[0:2].tolist()) for row in rows]
         track = np.vstack([self._recent, newest])
-        for row in rows:
-            for fix in row.fixes:
-                self._measure(fix, row.nav.origin, track)
+        waiting, self._waiting = self._waiting, []
+        for fix in waiting:
+            at_us = fix.time_us - self._delay_us
+            if at_us > track[-1, 0]:
+                self._waiting.append(fix)
+            elif at_us >= track[0, 0]:
+                self._measure(fix, at_us, rows[-1].nav.origin, track)
         self._recent = track[track[:, 0] > track[-1, 0] - MEMORY_US]
 
     def as_dict(self) -> dict[str, Any] | None:
@@ -60,13 +67,14 @@ class FixDistance:
         return {'count': self._count, 'rms': math.sqrt(self._sum / self._count),
                 'largest': self._largest, 'over_limit': self._over}
 
-    def _measure(self, fix: GnssSample, origin: GeoPoint | None, track: Array) -> None:
-        at = fix.time_us - self._delay_us
-        if origin is None or not track[0, 0] <= at <= track[-1, 0]:
+    def _measure(
+        self, fix: GnssSample, at_us: int, origin: GeoPoint | None, track: Array,
+    ) -> None:
+        if origin is None:
             return
         north, east = self._project(origin, fix)
-        distance = math.hypot(float(np.interp(at, track[:, 0], track[:, 1])) - north,
-                              float(np.interp(at, track[:, 0], track[:, 2])) - east)
+        distance = math.hypot(float(np.interp(at_us, track[:, 0], track[:, 1])) - north,
+                              float(np.interp(at_us, track[:, 0], track[:, 2])) - east)
         self._count += 1
         self._sum += distance * distance
         self._largest = max(self._largest, distance)

@@ -65,6 +65,7 @@ class Progress:
     first_output_us: int | None = None
     rows: int = 0
     fix_distance: dict[str, Any] | None = None
+    withheld_distance: dict[str, Any] | None = None
     events: list[Event] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     kernel_seconds: float = 0.0
@@ -162,6 +163,7 @@ class _Run:
             if options.write_bag else None
         self._rows: list[FusedOutput] = []
         self._fix_distance = FixDistance(self.session.params)
+        self._prediction = FixDistance(self.session.params)
         self.withholding = Withholding(options.withhold, progress.start_us)
 
     def drive(self, steps: Iterable[list[FusedOutput]]) -> None:
@@ -179,6 +181,7 @@ class _Run:
             self.progress.events = self.session.drain_events()
         self.progress.rows = self._track.rows
         self.progress.fix_distance = self._fix_distance.as_dict()
+        self.progress.withheld_distance = self._prediction.as_dict()
         self.progress.cpu_seconds = time.process_time() - cpu
         self.progress.wall_seconds = time.perf_counter() - wall
 
@@ -194,7 +197,8 @@ class _Run:
         """Write the rows that have gathered."""
         rows, self._rows = self._rows, []
         self._track.write([output.nav for output in rows])
-        self._fix_distance.note(rows)
+        self._fix_distance.note(rows, [fix for row in rows for fix in row.fixes])
+        self._prediction.note(rows, self.withholding.take_fixes())
         if self._bag is not None and rows:
             self._bag.write(rows)
 
@@ -265,6 +269,7 @@ def _csv_steps(run: _Run) -> Iterator[list[FusedOutput]]:
             break
         role = ROLE_OF_SAMPLE[type(sample)]
         if run.withholding.holds(role, sample.time_us):
+            run.withholding.keep(sample)
             session.refuse(role, 'withheld')
             continue
         outputs = session.push(sample)

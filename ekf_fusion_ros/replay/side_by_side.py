@@ -21,8 +21,8 @@ Say = Callable[[str], None]
 Row = tuple[str, Callable[[Mapping[str, Any]], str]]
 
 
-def _distance(summary: Mapping[str, Any], key: str) -> str:
-    found = summary['fix_distance']
+def _distance(summary: Mapping[str, Any], key: str, which: str = 'fix_distance') -> str:
+    found = summary[which]
     return '-' if found is None else f'{found[key]:.2f}'
 
 
@@ -36,6 +36,10 @@ ROWS: tuple[Row, ...] = (
     ('rows', lambda summary: str(summary['rows'])),
     ('used fixes to the track, m RMS', lambda summary: _distance(summary, 'rms')),
     ('used fixes to the track, m at most', lambda summary: _distance(summary, 'largest')),
+    ('withheld fixes to the track, m RMS',
+     lambda summary: _distance(summary, 'rms', 'withheld_distance')),
+    ('withheld fixes to the track, m at most',
+     lambda summary: _distance(summary, 'largest', 'withheld_distance')),
     ('observations fused', lambda summary: str(_sum(summary, 'fused'))),
     ('observations rejected', lambda summary: str(_sum(summary, 'rejected'))),
     ('jumps of the state', lambda summary: str(sum(summary['resets'].values()))),

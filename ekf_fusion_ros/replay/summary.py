@@ -62,6 +62,7 @@ def _content(
         'first_output': _seconds(progress.first_output_us),
         'rows': progress.rows,
         'fix_distance': progress.fix_distance,
+        'withheld_distance': progress.withheld_distance,
         'notes': progress.notes,
         'cpu_seconds': progress.cpu_seconds,
         'kernel_loading_cpu_seconds': progress.kernel_seconds,
@@ -158,11 +159,12 @@ def _gist(summary: dict[str, Any]) -> list[str]:
         after = summary['first_output'] - summary['start']
         lines.append(f'{summary["rows"]} rows in frame {summary["frame"]}, the first '
                      f'{after:.1f} s after the start')
-    distance = summary['fix_distance']
-    if distance is not None:
-        lines.append(f'used fixes: track passes by {distance["rms"]:.2f} m RMS, at most '
-                     f'{distance["largest"]:.2f} m, {distance["over_limit"]} of '
-                     f'{distance["count"]} beyond 3 sigma + 2 m')
+    for which in ('fix', 'withheld'):
+        distance = summary[f'{which}_distance']
+        if distance is not None:
+            lines.append(f'{"used" if which == "fix" else which} fixes: track passes by '
+                         f'{distance["rms"]:.2f} m RMS, at most {distance["largest"]:.2f} m, '
+                         f'{distance["over_limit"]} of {distance["count"]} beyond 3 sigma + 2 m')
     for name, topic in summary['topics'].items():
         reasons = ', '.join(f'{n} {reason}' for reason, n in topic['refused'].items())
         passed_over = ', '.join(f'{n} {reason}' for reason, n in topic['passed_over'].items())

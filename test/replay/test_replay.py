@@ -187,6 +187,31 @@ def test_withheld_fixes_are_counted_and_not_fused(flight, replayed, tmp_path):
     assert (gap[inside, 12] > whole[inside, 12]).all()
 
 
+def test_withheld_fixes_score_the_prediction(flight, replayed, tmp_path, capsys):
+    pymap3d = pytest.importorskip('pymap3d')
+    assert run(flight[0], tmp_path, '--withhold', 'fix=15:20,22:23') == 0
+    about, track = summary(tmp_path), rows(tmp_path)
+    origin, start_us = about['origin'], flight[1].start_us
+    distances = []
+    for arrival in flight[1].arrivals():
+        seconds = (arrival.time_us - start_us) * 1e-6
+        if arrival.role == 'fix' and (15.0 <= seconds < 20.0 or 22.0 <= seconds < 23.0):
+            fix = arrival.sample
+            east, north, _ = pymap3d.geodetic2enu(
+                fix.lat, fix.lon, origin['alt'], origin['lat'], origin['lon'], origin['alt'])
+            # ekf2.gnss.delay_ms is 110 unless told otherwise
+            at = fix.time_us * 1e-6 - 0.11
+            distances.append(math.hypot(*(
+                np.interp(at, track[:, 0], track[:, axis]) - place
+                for axis, place in ((1, east), (2, north)))))
+    told = about['withheld_distance']
+    assert told['count'] == len(distances) == 30
+    assert told['rms'] == pytest.approx(np.sqrt(np.mean(np.square(distances))), abs=0.01)
+    assert told['largest'] == pytest.approx(max(distances), abs=0.01)
+    assert f'withheld fixes: track passes by {told["rms"]:.2f} m RMS' in capsys.readouterr().out
+    assert summary(replayed)['withheld_distance'] is None
+
+
 def test_states_of_every_update(flight, tmp_path):
     assert run(flight[0], tmp_path, '--log-states', '--end', '5') == 0
     with (tmp_path / 'estimator.csv').open() as file:

@@ -33,7 +33,8 @@ def options(tmp_path, monkeypatch):
                   'alt': 0.0}
         return {'origin': origin, 'start': 10.0, 'first_output': 12.5, 'rows': 2,
                 'resets': {'position_ne': 1},
-                'fix_distance': {'rms': 0.5, 'largest': 1.25}, 'cpu_seconds': 0.3,
+                'fix_distance': {'rms': 0.5, 'largest': 1.25}, 'withheld_distance': None,
+                'cpu_seconds': 0.3,
                 'aid_sources': {'gnss_position': {'fused': 7, 'rejected': 1}}}
 
     def chosen(params, overrides):
