@@ -224,7 +224,7 @@ class ReceiverBank:
                          for of_kind in shares))
         place = prediction.place(
             self._mean_deviation(shares), time_us - self._delay_us, arms)
-        eph, epv, sacc = (min((self._readings[name].sigma[kind] for name in of_kind),
+        eph, epv, sacc = (min((self._sigma(name, kind) for name in of_kind),
                               default=math.nan) for kind, of_kind in enumerate(shares))
         best = max(shares[POSITION], key=lambda name: shares[POSITION][name])
         fixes = [self._readings[name].fix for name in shares[POSITION]]
@@ -254,9 +254,16 @@ class ReceiverBank:
         usable = [name for name, reading in self._readings.items() if reading.has(kind)]
         fine = [name for name in usable if not self._obstacle(name, kind)]
         chosen = [name for name in fine or usable if among is None or name in among]
-        inverse = {name: self._readings[name].sigma[kind] ** -2 for name in chosen}
+        inverse = {name: self._sigma(name, kind) ** -2 for name in chosen}
         total = sum(inverse.values())
         return {name: weight / total for name, weight in inverse.items()}
+
+    def _sigma(self, name: str, kind: int) -> float:
+        """Return the accuracy to weigh a receiver by: that it claims, less for one just back."""
+        sigma = self._readings[name].sigma[kind]
+        if kind not in self._offsets:
+            return sigma
+        return sigma / math.sqrt(self._offsets[kind].presence(name))
 
     def _obstacle(self, name: str, kind: int) -> str:
         return (self._plausibility.reason(name, kind)

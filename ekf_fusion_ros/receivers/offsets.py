@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from collections.abc import Mapping
 
 import numpy as np
@@ -9,20 +10,27 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+LEAST_PRESENCE = 0.1
+"""Share of its weight with which a receiver comes back: accuracies stay within those of fixes."""
+
 
 class _Mean:
-    """Mean deviation of one receiver: of all so far at first, then over the last seconds."""
+    """Mean deviation of one receiver: of all so far at first, then over the last seconds.
+
+    presence: 0 to 1, from away for an averaging time to there for one.
+    """
 
     def __init__(self, time_us: int, size: int) -> None:
         self.value = np.zeros(size)
         self.first_us = time_us
         self.last_us = time_us
+        self.presence = 0.0
         self._count = 0
 
     def update(self, deviation: Array, time_us: int, time_constant_us: float) -> Array:
         """Take a deviation in and return by how much the mean has moved."""
         self._count += 1
-        share = (time_us - self.last_us) / time_constant_us
+        share = self.presence * (time_us - self.last_us) / time_constant_us
         self.last_us = time_us
         change: Array = min(1.0, max(share, 1.0 / self._count)) * (deviation - self.value)
         self.value = self.value + change
@@ -37,7 +45,9 @@ class Offsets:
     prediction, at once; to the weighted mean of the receivers that are there it goes over
     slowly, within `handover_time`. So neither the weights nor who is there ever make it jump,
     and without a hand-over it is their weighted mean. A receiver counts for the level once it
-    was averaged for an offset time; one that is absent is taken along with it.
+    was averaged for an offset time; one that is absent is taken along with it. One that comes
+    back contradicts the prediction by all that this has drifted without it: its weight, and how
+    fast its mean forgets, grow with its presence.
     """
 
     def __init__(self, size: int, offset_time: float, handover_time: float) -> None:
@@ -55,6 +65,14 @@ class Offsets:
         mean = self._means.get(name)
         return np.zeros(self._size) if mean is None else mean.value - self._level
 
+    def presence(self, name: str) -> float:
+        """Return how long a receiver has been back against the others, LEAST_PRESENCE to 1."""
+        longest = max((mean.presence for mean in self._means.values()), default=0.0)
+        if longest == 0.0:
+            return 1.0
+        presence = self._means[name].presence if name in self._means else 0.0
+        return max(LEAST_PRESENCE, presence / longest)
+
     def move(self, step: Array) -> None:
         """Take a reset of the prediction in, which moves all deviations (size,) alike."""
         for mean in self._means.values():
@@ -65,6 +83,7 @@ class Offsets:
         self, deviations: Mapping[str, Array], weights: Mapping[str, float], time_us: int,
     ) -> None:
         """Take in the deviations of one time; weights: of every receiver that is there."""
+        self._note_presence(weights, time_us)
         changes = {name: self._average(name, deviation, time_us)
                    for name, deviation in deviations.items()}
         shares = self._shares(weights, time_us)
@@ -75,6 +94,12 @@ class Offsets:
                 mean.value = mean.value + move
         self._level = self._level + move
         self._hand_over(shares, time_us)
+
+    def _note_presence(self, there: Collection[str], time_us: int) -> None:
+        share = (time_us - self._last_us) / self._offset_us
+        for name, mean in self._means.items():
+            presence = mean.presence + (share if name in there else -share)
+            mean.presence = min(1.0, max(0.0, presence))
 
     def _average(self, name: str, deviation: Array, time_us: int) -> Array:
         mean = self._means.get(name)

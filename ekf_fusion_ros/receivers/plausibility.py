@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from collections.abc import Mapping
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,25 +52,30 @@ class Plausibility:
             known = {name: reading for name, reading in readings.items() if reading.has(kind)}
             if len(known) < 2:
                 continue
-            reference = self._reference(known, kind, prediction)
+            reference, variance = self._reference(known, kind, prediction)
             for name in (name for name in new if name in known):
                 difference = known[name].deviation[PARTS[kind]] - reference
                 deviation = float(np.linalg.norm(difference))
-                limit = max(self._params.gate * known[name].sigma[kind], self._smallest[kind])
+                sigma = math.sqrt(known[name].sigma[kind] ** 2 + variance)
+                limit = max(self._params.gate * sigma, self._smallest[kind])
                 news += self._note(name, kind, deviation, limit, time_us)
         return news
 
     def _reference(
-        self, known: Mapping[str, Reading], kind: int, prediction: Prediction) -> Array:
+        self, known: Mapping[str, Reading], kind: int, prediction: Prediction,
+    ) -> tuple[Array, float]:
+        """Return what the majority says and its variance, taken for that of a mean."""
         votes = [reading.deviation[PARTS[kind]] for reading in known.values()]
+        sigmas = [reading.sigma[kind] for reading in known.values()]
         if prediction.trusted and prediction.sigma[kind] <= self._smallest[kind]:
             votes.append(np.zeros_like(votes[0]))
+            sigmas.append(prediction.sigma[kind])
         if len(votes) >= MAJORITY:
             median: Array = np.median(votes, axis=0)
-            return median
+            return median, sum(sigma ** 2 for sigma in sigmas) / len(sigmas) ** 2
         best = min(known, key=lambda name: (
             bool(self.reason(name, kind)), known[name].sigma[kind]))
-        return known[best].deviation[PARTS[kind]]
+        return known[best].deviation[PARTS[kind]], known[best].sigma[kind] ** 2
 
     def _note(
         self, name: str, kind: int, deviation: float, limit: float, time_us: int) -> list[str]:

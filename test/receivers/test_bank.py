@@ -114,8 +114,9 @@ def test_a_reset_of_the_estimate_between_two_fixes_excludes_nobody():
     assert not any('position' in status.obstacles for status in bank.statuses())
 
 
-@pytest.mark.parametrize(('deviation', 'excluded'), [(5.9, False), (6.1, True)])
+@pytest.mark.parametrize(('deviation', 'excluded'), [(6.6, False), (6.7, True)])
 def test_the_gate(deviation, excluded):
+    """Six sigmas of the difference from a mean of 1, 1 and 0.1 m: 6.64 m."""
     bank = bank_of(('a', 'b'), standing, gate=6.0, min_deviation=5.0)
     push(bank, 1.0, a=0.0, b=deviation)
     assert ('position' in bank.statuses()[1].obstacles) == excluded
@@ -179,6 +180,23 @@ def test_offsets_hold_the_level_where_one_goes_and_give_way_slowly():
         assert offsets.of('b')[0] == pytest.approx(expected, abs=0.02)
     # The one that is gone is taken along: it would come back without a step.
     assert offsets.of('a')[0] - offsets.of('b')[0] == pytest.approx(2.0, abs=1e-9)
+
+
+def test_one_that_comes_back_regains_its_weight_in_an_offset_time():
+    bank = bank_of(('a', 'b'), standing, offset_time=10.0, timeout=2.0)
+    weights = {}
+    for k in range(500):
+        seconds = 0.2 * k
+        bank.advance(START + round(1e6 * (seconds - 0.01)))
+        away = 40.0 <= seconds < 60.0
+        push(bank, seconds, **({'b': 0.0} if away else {'a': 0.0, 'b': 0.0}))
+        weights[k] = bank.statuses()[0].weights[0]
+    assert weights[199] == pytest.approx(0.5)
+    assert weights[299] == 0.0
+    # A tenth against the whole of the other at first, half against whole after half the time.
+    assert weights[300] == pytest.approx(0.1 / 1.1, abs=0.01)
+    assert weights[325] == pytest.approx(1.0 / 3.0, abs=0.02)
+    assert weights[351] == pytest.approx(0.5, abs=0.01)
 
 
 def test_errors_of_the_prediction_are_not_taken_for_offsets():
