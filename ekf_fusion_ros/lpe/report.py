@@ -46,7 +46,7 @@ def nav_state(lpe: Lpe) -> NavState:
         local_position_valid=f.valid.horizontal,
         global_position_valid=f.valid.horizontal and f.map.origin is not None,
         gnss_started=fresh or lpe.sensors.gnss.observation.starts > 0 or f.map.fake,
-        in_air=f.landed is False,
+        in_air=f.landed is False or lpe.sensors.gnss.moves,
         yaw_jump=attitude.yaw_jump,
         acceleration=f.acceleration.copy(),
         ground_down=float(x[TERRAIN]) if f.valid.terrain else None,

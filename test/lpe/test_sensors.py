@@ -411,6 +411,27 @@ def test_standing_on_the_ground_is_measured_ten_times_a_second():
     assert bench.lpe.nav_state().in_air
 
 
+@pytest.mark.parametrize(('speed', 'believed'), [(0.9, True), (1.1, False)])
+def test_landed_is_not_believed_while_the_fixes_travel(speed, believed):
+    bench = Bench()
+    bench.lpe.push(LandedSample(START_US, landed=True))
+    bench.run(3.0, fix()).run(1.5, fix(velocity=np.array((0.0, speed, 0.0))))
+    assert bench.sensor('land').timed_out != believed
+    assert bench.lpe.nav_state().in_air != believed
+    assert ('said to be landed while the fixes travel: not believed' in bench.events) != believed
+    bench.run(1.5, fix())
+    assert not bench.sensor('land').timed_out
+    assert not bench.lpe.nav_state().in_air
+
+
+def test_a_noisy_velocity_is_no_travel():
+    bench = Bench()
+    bench.lpe.push(LandedSample(START_US, landed=True))
+    bench.run(3.0, fix(velocity=np.array((0.0, 1.4, 0.0)), sacc=0.5))
+    assert not bench.sensor('land').timed_out
+    assert not bench.lpe.nav_state().in_air
+
+
 def test_a_landing_far_above_the_known_ground_is_a_fault():
     bench = Bench().run(5.0, baro(), distance(10.0))
     bench.lpe.push(LandedSample(START_US, landed=True))

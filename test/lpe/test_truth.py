@@ -9,6 +9,7 @@ import pytest
 
 from ekf_fusion_ros.ekf2.ekf2 import Ekf2
 from ekf_fusion_ros.lpe.lpe import Lpe
+from ekf_fusion_ros.samples import LandedSample
 from ekf_fusion_ros.simulation.scenario import Scenario
 from ekf_fusion_ros.simulation.scenario import default_sensors
 from ekf_fusion_ros.simulation.trajectory import Flight
@@ -36,6 +37,18 @@ def test_with_true_attitude_it_is_nearly_as_good_as_ekf2(fly, trajectory, seed):
     ekf = fly(Ekf2(), scenario, true_attitude=False).after(60.0)
     assert lpe.rms(HORIZONTAL) < 1.5 * ekf.rms(HORIZONTAL)
     assert lpe.rms() < 1.5 * ekf.rms()
+
+
+@pytest.mark.parametrize('trajectory', [
+    FLIGHT, pytest.param(Loiter(duration=90.0), marks=pytest.mark.slow)])
+def test_a_land_detector_that_is_stuck_does_not_hold_it_on_the_ground(fly, trajectory):
+    lpe = Lpe()
+    take = lpe.push
+    lpe.push = lambda sample: None if isinstance(sample, LandedSample) and not sample.landed \
+        else take(sample)
+    flown = fly(lpe, scenario_of(trajectory, 4), true_attitude=True).after(40.0)
+    assert np.linalg.norm(flown.position[:, HORIZONTAL], axis=1).max() < 5.0
+    assert lpe.filter.landed
 
 
 def test_without_noise_the_error_vanishes(fly):

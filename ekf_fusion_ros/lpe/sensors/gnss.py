@@ -24,6 +24,9 @@ Array = NDArray[np.float64]
 C = np.eye(6, SIZE)
 LEAST_SATELLITES = 6
 FIX_3D = 3
+TRAVELLING_SPEED = 1.0
+SIGNIFICANT = 3.0
+"""m/s and sigmas above which a speed is none of a body at rest."""
 
 
 class Gnss(Sensor):
@@ -43,15 +46,30 @@ class Gnss(Sensor):
     def __init__(self, f: Filter) -> None:
         super().__init__(f)
         self._places: list[tuple[float, float, float]] = []
+        self._moved_us = -SECOND
+
+    @property
+    def moves(self) -> bool:
+        """True while the fixes say by their velocity that the antenna travels."""
+        return self._f.now_us - self._moved_us < self.timeout_us
 
     def enabled(self) -> bool:
         return self._f.params.gnss.enabled
 
     def measure(self, sample: GnssSample) -> GnssSample | None:
         if sample.fix_type >= FIX_3D:
+            self._note_motion(sample)
             return sample
         self.passed_over['no_3d_fix'] += 1
         return None
+
+    def _note_motion(self, fix: GnssSample) -> None:
+        if not fix.has_velocity:
+            return
+        sacc = fix.sacc if math.isfinite(fix.sacc) else self._f.params.gnss.noise_vxy
+        speed = math.hypot(float(fix.velocity[0]), float(fix.velocity[1]))
+        if speed > max(TRAVELLING_SPEED, SIGNIFICANT * sacc):
+            self._moved_us = self._f.now_us
 
     def gather(self, measured: GnssSample) -> bool:
         params = self._f.params.gnss

@@ -38,7 +38,7 @@ class Suite:
         self.flow = OpticalFlow(f)
         self.vision = Vision(f)
         self.mocap = Mocap(f)
-        self.land = Land(f)
+        self.land = Land(f, self.gnss)
         self.landing_target = LandingTarget(f)
         self.all: tuple[Sensor, ...] = (
             self.gnss, self.baro, self.lidar, self.sonar, self.flow, self.vision, self.mocap,
