@@ -16,6 +16,7 @@ from ekf_fusion_ros.session import FusionSession
 NO_STATE = 'no pose can be set yet: wait until the filter has started'
 NO_MAP = 'there is no map yet: wait until a good fix has set its origin'
 LOCAL = 'no fix takes part, so that the frame has no place on the earth: set node.use_fix to true'
+GIVE_POINT = 'give deg within -90 .. 90 and -180 .. 180, and m'
 
 
 class Steering:
@@ -61,16 +62,25 @@ class Steering:
 
     def set_origin(self, point: GeoPoint) -> str:
         """Move the origin of the map; the place of the vehicle on the earth stays."""
-        place = f'latitude {point.lat}, longitude {point.lon}, altitude {point.alt}'
+        place = words_of(point)
         if not point.on_earth:
-            return (f'{place} is not a point of the earth: give deg within -90 .. 90 and '
-                    '-180 .. 180, and m')
+            return f'{place} is not a point of the earth: {GIVE_POINT}'
         if self._session.local:
             return LOCAL
         if not self._session.set_origin(point):
             return f'the estimator does not take {place} as origin'
         self._session.announce(f'origin of the map set on request: {place}')
         return ''
+
+    def set_home(self, point: GeoPoint | None) -> str:
+        """Set home by hand, to stay; None: to where the vehicle is, by the rules from then on."""
+        if self._session.set_home(point):
+            return ''
+        if point is None:
+            status = self._session.navigation
+            words = '; '.join(one.sentence(status.time_us) for one in status.missing)
+            return f'home cannot be here: {words or "there is no estimate yet"}'
+        return f'{words_of(point)} is not a point of the earth: {GIVE_POINT}'
 
     def set_pose(self, message: Any) -> str:
         """Jump to the pose of a PoseWithCovarianceStamped."""
@@ -106,3 +116,8 @@ class Steering:
         if origin is None:
             raise ValueError(NO_MAP)
         return origin
+
+
+def words_of(point: GeoPoint) -> str:
+    """Return a point in words."""
+    return f'latitude {point.lat}, longitude {point.lon}, altitude {point.alt}'

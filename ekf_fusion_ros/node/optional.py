@@ -12,6 +12,8 @@ TYPES = {
     'datum': ('robot_localization.srv', 'SetDatum'),
     'toLL': ('robot_localization.srv', 'ToLL'),
     'fromLL': ('robot_localization.srv', 'FromLL'),
+    'toLLArray': ('robot_localization.srv', 'ToLLArray'),
+    'fromLLArray': ('robot_localization.srv', 'FromLLArray'),
     'set_gp_origin': ('geographic_msgs.msg', 'GeoPointStamped'),
     '/tf_static': ('tf2_msgs.msg', 'TFMessage'),
 }
@@ -22,8 +24,9 @@ SUBSTITUTES = {
     'set_pose': 'publish to the topic set_pose (geometry_msgs/PoseWithCovarianceStamped)',
     'datum': 'publish to ~/set_origin (sensor_msgs/NavSatFix)',
     'set_gp_origin': 'publish to ~/set_origin (sensor_msgs/NavSatFix)',
-    'toLL': 'nothing',
-    'fromLL': 'nothing',
+    **dict.fromkeys(('toLL', 'fromLL', 'toLLArray', 'fromLLArray'),
+                    'no standard type fits; in Python, point_of_map and map_of_point of '
+                    'ekf_fusion_ros.map_origin, with the origin that ~/events tells'),
     '/tf_static': 'set messages.*.mount_xyz and mount_rpy',
 }
 """What serves instead of a type that is not there."""

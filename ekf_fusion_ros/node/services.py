@@ -18,17 +18,20 @@ from std_srvs.srv import Empty
 from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
 
-from ekf_fusion_ros.estimator import GeoPoint
 from ekf_fusion_ros.live.steering import Steering
 from ekf_fusion_ros.node.guard import INTERNAL_ERROR
 from ekf_fusion_ros.node.guard import Guard
 from ekf_fusion_ros.node.optional import absence
 from ekf_fusion_ros.node.optional import found_types
+from ekf_fusion_ros.node.places import Places
+from ekf_fusion_ros.node.places import geo_point
 
 REQUEST_DEPTH = 10
 LEVEL_ERROR = 1e-3
 """Length of the vector part of an orientation that is as good as none."""
 
+UNTURNED = ('the origin is set, but the orientation is not used: x of this map points east, '
+            'whatever the datum says')
 Work = Callable[[Any, Any], str]
 
 
@@ -40,6 +43,7 @@ class Services:
     ) -> None:
         self._node = node
         self._steering = steering
+        self._places = Places(steering)
         self._guard = guard
         self._offer_own(roles)
         self._offer_standard()
@@ -59,7 +63,10 @@ class Services:
             self._serve(SetBool, f'~/use_{role}',
                         lambda request, _, role=role: self._switch(role, request.data))
         self._listen(NavSatFix, '~/set_origin', lambda message: steering.set_origin(
-            GeoPoint(message.latitude, message.longitude, message.altitude)))
+            geo_point(message)))
+        self._listen(NavSatFix, '~/set_home', lambda message: steering.set_home(
+            geo_point(message)))
+        self._serve(Trigger, '~/set_home_here', lambda _, __: steering.set_home(None))
 
     def _offer_standard(self) -> None:
         """Offer what robot_localization offers with standard types."""
@@ -74,9 +81,10 @@ class Services:
                 geo_point(message.position)))
             return
         works: dict[str, Work] = {
-            'toggle': self._toggle, 'datum': self._set_datum, 'toLL': self._to_ll,
-            'fromLL': self._from_ll,
-            'set_pose': lambda request, _: self._steering.set_pose(request.pose)}
+            'toggle': self._toggle, 'datum': self._set_datum,
+            'set_pose': lambda request, _: self._steering.set_pose(request.pose),
+            'toLL': self._places.to_ll, 'toLLArray': self._places.to_ll_array,
+            'fromLL': self._places.from_ll, 'fromLLArray': self._places.from_ll_array}
         if name in works:
             self._serve(kind, name, works[name])
 
@@ -90,31 +98,14 @@ class Services:
         response.status = bool(request.on) != self._steering.enabled
         return self._steering.enable(bool(request.on))
 
-    def _set_datum(self, request: Any, _: Any) -> str:
+    def _set_datum(self, request: Any, response: Any) -> str:
+        refusal = self._steering.set_origin(geo_point(request.geo_pose.position))
         turn = request.geo_pose.orientation
-        if max(abs(turn.x), abs(turn.y), abs(turn.z)) > LEVEL_ERROR:
-            self._node.get_logger().warning(
-                'datum: the orientation is not used, the x axis of the map points east')
-        return self._steering.set_origin(geo_point(request.geo_pose.position))
-
-    def _to_ll(self, request: Any, response: Any) -> str:
-        place = request.map_point
-        try:
-            point = self._steering.point_of_map(place.x, place.y, place.z)
-        except ValueError as error:
-            return str(error)
-        answer = response.ll_point
-        answer.latitude, answer.longitude, answer.altitude = point.lat, point.lon, point.alt
-        return ''
-
-    def _from_ll(self, request: Any, response: Any) -> str:
-        try:
-            place = self._steering.map_of_point(geo_point(request.ll_point))
-        except ValueError as error:
-            return str(error)
-        answer = response.map_point
-        answer.x, answer.y, answer.z = place
-        return ''
+        if not refusal and max(abs(turn.x), abs(turn.y), abs(turn.z)) > LEVEL_ERROR:
+            self._node.get_logger().warning(f'datum: {UNTURNED}')
+            if hasattr(response, 'message'):
+                response.message = UNTURNED
+        return refusal
 
     def _serve(self, kind: Any, name: str, work: Work) -> None:
         """Offer a service whose work returns '' or why it was not done."""
@@ -151,14 +142,9 @@ class Services:
         if hasattr(response, 'success'):
             response.success = not refusal
         if hasattr(response, 'message'):
-            response.message = refusal or 'done'
+            response.message = refusal or response.message or 'done'
         if refusal:
             self._warn(name, refusal)
 
     def _warn(self, name: str, refusal: str) -> None:
         self._node.get_logger().warning(f'{name}: not done: {refusal}')
-
-
-def geo_point(message: Any) -> GeoPoint:
-    """Return a geographic_msgs/GeoPoint as ours."""
-    return GeoPoint(message.latitude, message.longitude, message.altitude)

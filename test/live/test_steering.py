@@ -89,6 +89,14 @@ def test_a_pose_needs_a_state_and_the_right_frame(bench: Bench) -> None:
     assert "give it in 'map'" in bench.steering.set_pose(pose('odom'))
 
 
+def test_home_is_set_or_refused(bench: Bench) -> None:
+    assert bench.steering.set_home(GeoPoint(99.0, 8.0, 400.0)) == (
+        'latitude 99.0, longitude 8.0, altitude 400.0 is not a point of the earth: give deg '
+        'within -90 .. 90 and -180 .. 180, and m')
+    assert bench.steering.set_home(None) == 'home cannot be here: there is no estimate yet'
+    assert bench.steering.set_home(GeoPoint(47.0, 8.0, 400.0)) == ''
+
+
 def test_points_need_a_map(bench: Bench) -> None:
     with pytest.raises(ValueError, match=NO_MAP):
         bench.steering.point_of_map(0.0, 0.0, 0.0)

@@ -28,10 +28,13 @@ from test_fuser import odometry
 from ekf_fusion_ros.estimator import GeoPoint
 from ekf_fusion_ros.live.steering import Steering
 from ekf_fusion_ros.live.switches import Switches
+from ekf_fusion_ros.node import places
 from ekf_fusion_ros.node import services
 from ekf_fusion_ros.node.guard import Guard
+from ekf_fusion_ros.node.inputs import TOPICS
 from ekf_fusion_ros.node.optional import TYPES
 from ekf_fusion_ros.node.optional import absence
+from ekf_fusion_ros.node.qos import latched_qos
 from ekf_fusion_ros.params import Params
 from ekf_fusion_ros.session import FusionSession
 
@@ -181,6 +184,54 @@ def test_origin_pose_and_reset(operator: Operator) -> None:
 
 
 @pytest.mark.slow
+def test_a_pose_in_another_frame_is_refused_by_name(operator: Operator) -> None:
+    pose = given_pose(0.0, 0.0)
+    pose.header.frame_id = 'camera_odom'
+    operator.request(PoseWithCovarianceStamped, '/set_pose', pose)
+    operator.hears(
+        "/set_pose: not done: the pose is in frame 'camera_odom': give it in 'map'")
+
+
+@pytest.mark.slow
+def test_home_is_set_by_hand_and_here(operator: Operator) -> None:
+    homes: list[NavSatFix] = []
+    operator.peer.node.create_subscription(NavSatFix, '/home', homes.append, latched_qos())
+    answer = operator.ask(Trigger, '/fuser/set_home_here', Trigger.Request())
+    assert not answer.success
+    assert answer.message.startswith('home cannot be here: ')
+    operator.request(NavSatFix, '/fuser/set_home', NavSatFix(latitude=99.0))
+    operator.hears('/fuser/set_home: not done: latitude 99.0')
+    operator.drive_until(lambda: bool(operator.peer.odometry) and bool(homes))
+    operator.request(
+        NavSatFix, '/fuser/set_home', NavSatFix(latitude=46.5, longitude=7.5, altitude=100.0))
+    operator.drive_until(lambda: homes[-1].latitude == 46.5)
+    assert (homes[-1].longitude, homes[-1].altitude) == (7.5, 100.0)
+    operator.hears('home set by hand: 46.5')
+    assert operator.ask(Trigger, '/fuser/set_home_here', Trigger.Request()).success
+    operator.drive_until(lambda: homes[-1].latitude == pytest.approx(47.0, abs=1e-3))
+
+
+@pytest.mark.slow
+def test_every_input_has_its_switch(start_fuser: StartFuser, peer: Peer) -> None:
+    """All roles but the one that carries the time of the filter."""
+    aids = [role for role in TOPICS if role != 'imu']
+    operator = Operator(start_fuser({f'node.use_{role}': True for role in TOPICS}), peer)
+    for on, success in ((False, False), (True, True)):
+        answer = operator.ask(SetBool, '/fuser/use_imu', SetBool.Request(data=on))
+        assert answer.success is success
+    for role in aids:
+        answer = operator.ask(SetBool, f'/fuser/use_{role}', SetBool.Request(data=False))
+        assert (answer.success, answer.message) == (True, 'done'), role
+        operator.peer.until(
+            lambda role=role: peer.texts()[role].startswith('switched off, '), operator.fuser)
+        answer = operator.ask(SetBool, f'/fuser/use_{role}', SetBool.Request(data=True))
+        assert answer.success, role
+        operator.peer.until(
+            lambda role=role: peer.texts()[role].startswith('nothing received on '),
+            operator.fuser)
+
+
+@pytest.mark.slow
 def test_live_parameters_change_and_others_say_why_not(operator: Operator) -> None:
     operator.drive(5)
     assert operator.change(ekf2__gnss__pos_gate=4.0, messages__fix__default_eph=2.0) == ['', '']
@@ -293,8 +344,8 @@ def point(lat: float, lon: float, alt: float) -> SimpleNamespace:
 
 def test_every_service_of_robot_localization_is_offered(full: Any) -> None:
     node, _ = full
-    assert {'toggle', 'set_pose', 'datum', 'toLL', 'fromLL', 'reset', 'enable',
-            'topic set_pose', 'topic set_gp_origin'} <= {*node.offered}
+    assert {'toggle', 'set_pose', 'datum', 'toLL', 'fromLL', 'toLLArray', 'fromLLArray',
+            'reset', 'enable', 'topic set_pose', 'topic set_gp_origin'} <= {*node.offered}
     assert not any('switched off, because' in line for line in node.said)
 
 
@@ -315,9 +366,11 @@ def test_datum_and_origin_topic_set_the_origin(full: Any, monkeypatch: pytest.Mo
         geo_pose=SimpleNamespace(position=point(47.0, 8.0, 400.0), orientation=turn))
     response = SimpleNamespace(success=None, message=None)
     node.offered['datum'](request, response)
+    assert (response.success, response.message) == (True, services.UNTURNED)
+    assert f'datum: {services.UNTURNED}' in node.said
+    turn.z, turn.w, response.message = 0.0, 1.0, ''
+    node.offered['datum'](request, response)
     assert (response.success, response.message) == (True, 'done')
-    assert any('the orientation is not used' in line for line in node.said)
-    node.offered['datum'](request, SimpleNamespace())
     node.offered['topic set_gp_origin'](SimpleNamespace(position=point(46.0, 7.0, 1.0)))
     assert seen == [GeoPoint(47.0, 8.0, 400.0)] * 2 + [GeoPoint(46.0, 7.0, 1.0)]
 
@@ -339,6 +392,28 @@ def test_points_go_to_the_earth_and_back(full: Any, monkeypatch: pytest.MonkeyPa
     assert (place.x, place.y, place.z) == pytest.approx((100.0, 200.0, 3.0), abs=1e-3)
     node.offered['fromLL'](SimpleNamespace(ll_point=point(95.0, 0.0, 0.0)), back)
     assert 'fromLL: not done: latitude 95.0' in node.said[-1]
+
+
+def test_lists_of_points_go_whole_or_not_at_all(
+    full: Any, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    node, session = full
+    monkeypatch.setattr(places, 'imported', lambda *_: lambda: point(0.0, 0.0, 0.0))
+    monkeypatch.setattr(
+        type(session), 'origin', property(lambda _: GeoPoint(47.0, 8.0, 400.0)))
+    there, back = SimpleNamespace(ll_points=[]), SimpleNamespace(map_points=[])
+    asked = [SimpleNamespace(x=10.0, y=20.0, z=3.0), SimpleNamespace(x=-5.0, y=0.0, z=0.0)]
+    node.offered['toLLArray'](SimpleNamespace(map_points=asked), there)
+    assert [one.altitude for one in there.ll_points] == [403.0, 400.0]
+    node.offered['fromLLArray'](SimpleNamespace(ll_points=there.ll_points), back)
+    for place, answer in zip(asked, back.map_points, strict=True):
+        assert (answer.x, answer.y, answer.z) == pytest.approx(
+            (place.x, place.y, place.z), abs=1e-3)
+    back.map_points.clear()
+    node.offered['fromLLArray'](
+        SimpleNamespace(ll_points=[*there.ll_points, point(95.0, 0.0, 0.0)]), back)
+    assert back.map_points == []
+    assert 'fromLLArray: not done: latitude 95.0' in node.said[-1]
 
 
 def test_nothing_leaves_a_callback(full: Any) -> None:

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import re
+import time
 from typing import TYPE_CHECKING
 
 import pytest
 
 rclpy = pytest.importorskip('rclpy')
 
+from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from node.test_fuser import TWO_TOPICS
 from node.test_fuser import fix
 from node.test_fuser import odometry
 from node.test_life import Drive
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy
 from rclpy.qos import QoSProfile
 from rclpy.qos import ReliabilityPolicy
@@ -22,6 +25,8 @@ from sensor_msgs.msg import Imu
 from sensor_msgs.msg import NavSatFix
 
 from ekf_fusion_ros.ekf2.gnss_checks import CHECK_NAMES
+from ekf_fusion_ros.live.situation import PREPARING
+from ekf_fusion_ros.node import fusion_node
 
 if TYPE_CHECKING:
     from fuser_process import Fuser
@@ -234,3 +239,90 @@ def test_while_the_clock_stands_the_node_fuses_and_reports(
     drive.until_row(39.0)
     peer.until(lambda: state(peer).startswith('ok'), fuser)
     assert values(peer, 'odometry')['delay'] == ''
+
+
+def inertial(time_s: float) -> Imu:
+    """Return what an IMU at rest or at constant speed on level ground measures."""
+    message = Imu()
+    message.header.stamp = odometry(time_s).header.stamp
+    message.header.frame_id = 'base_link'
+    message.linear_acceleration.z = 9.81
+    return message
+
+
+def test_a_slow_imu_then_nothing_else_then_nothing_at_all(
+    start_fuser: StartFuser, peer: Peer,
+) -> None:
+    """50 Hz of IMU; the odometry and the fixes end first, then the IMU."""
+    fuser = start_fuser({'node.use_imu': True})
+    peer.connect(fuser, {**TWO_TOPICS, 'imu': Imu})
+    sent = 0
+
+    def drive_until_told(subject: str, pattern: str, *, alone: bool = False) -> None:
+        nonlocal sent
+        while not re.match(pattern, peer.texts()[subject]):
+            assert sent < 10000, peer.texts()
+            for step in range(sent, sent + 25):
+                peer.publish('imu', inertial(0.02 * step))
+                if step % 5 == 0 and not alone:
+                    peer.publish('odom', odometry(0.02 * step))
+                if step % 10 == 0 and not alone:
+                    peer.publish('fix', fix(0.02 * step))
+            sent += 25
+            peer.until(lambda goal=sent: peer.count('imu') >= goal, fuser)
+
+    drive_until_told('navigation', 'home not set: no valid global position, for ')
+    drive_until_told(
+        'estimator', r'ok: fusing GNSS.*; imu comes at 50\.\d Hz, less than the 100 Hz that')
+    assert peer.reports['estimator'].level == WARN
+    drive_until_told('navigation', r'home set: 47\.0')
+    drive_until_told('estimator', r'dead reckoning on inertial data for \d+ s', alone=True)
+    peer.until(lambda: re.match(
+        r'no IMU data for \d+ s: /imu has 1 reliable publisher$', state(peer)) is not None, fuser)
+    peer.until(lambda: 'position and velocity not valid: no inertial input for'
+               in peer.texts()['navigation'], fuser)
+
+
+class NeverReady:
+    """Kernels that are not ready until the test says so."""
+
+    done = False
+    error = None
+
+    def __init__(self, *_: object) -> None:
+        pass
+
+    def join(self) -> None:
+        pass
+
+
+def test_while_kernels_compile_the_node_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the process of the test: how long compiling takes is not in its hands."""
+    monkeypatch.setattr(fusion_node, 'Preparation', NeverReady)
+    rclpy.init()
+    node = fusion_node.FusionNode()
+    listener = rclpy.create_node('listener')
+    heard: list[str] = []
+    listener.create_subscription(
+        DiagnosticArray, '/diagnostics',
+        lambda message: heard.append(message.status[0].message), 10)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    executor.add_node(listener)
+    deadline = time.monotonic() + 60.0
+
+    def until(condition: Callable[[], bool]) -> None:
+        while not condition():
+            assert time.monotonic() < deadline, heard
+            executor.spin_once(timeout_sec=0.05)
+
+    try:
+        node.begin(lambda: False)
+        until(lambda: PREPARING in heard)
+        monkeypatch.setattr(NeverReady, 'done', True)
+        until(lambda: any(one.startswith('waiting for odometry') for one in heard))
+    finally:
+        executor.shutdown()
+        node.end()
+        listener.destroy_node()
+        rclpy.shutdown()
