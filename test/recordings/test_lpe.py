@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 
 import numpy as np
 import pytest
@@ -32,3 +33,28 @@ def test_the_track_stays_with_the_fixes(shared, tmp_path, name):
         assert tuple(next(rows)) == COLUMNS
         last = np.array([row for row in rows][-1], dtype=float)
     assert np.isfinite(last[:24]).all()
+
+
+@pytest.mark.slow
+def test_flow_and_range_agree_with_the_fixes_and_bridge_a_gap_at_low_speed(shared, tmp_path):
+    """Blind, position stands still in the gap while the vehicle goes on."""
+    name = 'inav_quad_optflow'
+    recording = shared / 'data' / name / f'{name}_mcap'
+    if not recording.exists():
+        pytest.skip(f'no {recording.name} in the shared folder')
+    camera = ('--topic', 'range=/range', '--topic', 'flow=/flow',
+              '--set', 'messages.flow.axes=frd')
+    farthest = {}
+    for folder, extra in (('seeing', camera), ('blind', ())):
+        output = tmp_path / folder
+        assert main(['replay', str(recording), '--output', str(output), '--no-bag',
+                     '--estimator', 'lpe', '--withhold', 'fix=600:660', *extra]) == 0
+        at, distance, limit = horizontal_errors(recording, output, 0.11, assumed_sigma=2.5)
+        gap = (at > at[0] + 600.0) & (at < at[0] + 663.0)
+        farthest[folder] = distance[gap].max()
+        assert (distance[~gap] < limit[~gap] + 1.0).all()
+    assert farthest['seeing'] < 0.5 * farthest['blind']
+    aids = json.loads((tmp_path / 'seeing' / 'summary.json').read_text(encoding='utf-8'))
+    flow = aids['aid_sources']['optical_flow']
+    assert flow['fused'] > 7500
+    assert flow['rejected'] < 0.01 * flow['fused']
