@@ -283,6 +283,15 @@ def test_a_slow_imu_then_nothing_else_then_nothing_at_all(
                in peer.texts()['navigation'], fuser)
 
 
+def test_the_other_estimator_tells_its_state_too(start_fuser: StartFuser, peer: Peer) -> None:
+    fuser = start_fuser({'estimator': 'lpe'})
+    drive = Drive(peer, fuser).connect()
+    assert state(peer) == 'waiting for odometry: /odom has 0 messages, 1 reliable publisher'
+    drive_until(drive, 0.0, lambda: state(peer).startswith('ok: fusing '))
+    assert 'gnss' in values(peer, 'estimator')['in_use']
+    assert int(values(peer, 'fix')['fused']) > 0
+
+
 class NeverReady:
     """Kernels that are not ready until the test says so."""
 
