@@ -359,6 +359,18 @@ def test_positions_start_correct_and_time_out(kind, samples, timeout):
     assert f'{kind} timed out' in bench.events
 
 
+def test_a_position_without_accuracy_has_the_least_noise_and_one_poor_axis_counts():
+    bench = Bench(seeing()).run(2.0, vision(1.0, 0.0, 0.0, sigma=math.nan))
+    assert bench.x[0] == pytest.approx(1.0, abs=0.1)
+    _, untold = vision(1.0, 0.0, 0.0, sigma=math.nan)
+    sensor = bench.sensor('vision')
+    measured = sensor.measure(untold(bench.time_us))
+    assert sensor.model(measured).R == pytest.approx((0.01, 0.01, 0.25))
+    poor = vision(1.0, 0.0, 0.0)[1](bench.time_us)._replace(
+        position_var=np.array((math.nan, 101.0 ** 2, 1.0)))
+    assert sensor.measure(poor) is None
+
+
 def test_vision_drops_a_fault_and_mocap_corrects_by_it():
     steps = {}
     for kind in ('vision', 'mocap'):

@@ -54,8 +54,10 @@ class ExternalPosition(Sensor):
         if not np.isfinite(sample.position).all():
             self.passed_over['no_position'] += 1
             return None
-        eph = math.sqrt(max(sample.position_var[0], sample.position_var[1]))
-        epv = math.sqrt(sample.position_var[2])
+        # An accuracy that is not told leaves the least noise.
+        north, east, down = np.where(
+            np.isnan(sample.position_var), 0.0, sample.position_var).tolist()
+        eph, epv = math.sqrt(max(north, east)), math.sqrt(down)
         if not max(eph, epv) <= ACCURACY_MAX:
             self.passed_over['not_accurate'] += 1
             return None
