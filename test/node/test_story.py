@@ -184,6 +184,8 @@ def test_a_check_that_fails_is_told_with_value_and_limit(
                 in peer.texts().get('gps checks', ''))
     assert peer.reports['gps checks'].level == WARN
     assert values(peer, 'gps checks')['max_horz_err'] == 'fail: 1, limit 0.5'
+    drive_until(drive, drive.sent / 10.0, lambda: re.match(
+        r'waiting for the GNSS checks to pass \(.*\bhacc\b.* failing\)', state(peer)) is not None)
     assert peer.odometry == []
     peer.until(lambda: 'nothing on /odometry/filtered' in peer.texts()['output'], fuser)
 
