@@ -136,6 +136,8 @@ def _wanted(params: Params, roles: Collection[str]) -> dict[str, dict[str, Any]]
         wanted['flow'] = {'enabled': True}
     if IMU not in roles:
         _add_odometry_as_imu(wanted)
+    elif ODOMETRY in roles and has_fix:
+        _add_odometry_beside_imu(wanted)
     return wanted
 
 
@@ -162,8 +164,8 @@ def _height_without_pressure(roles: Collection[str]) -> str:
 def _add_odometry_as_imu(wanted: dict[str, dict[str, Any]]) -> None:
     """Add the noise of increments that come from odometry.
 
-    They have no accelerometer bias and hardly a gyro bias, but drift in yaw, scale and slip. Fixes
-    err by metres over tens of seconds, which against such a smooth input must not pass for news.
+    They have no accelerometer bias and hardly a gyro bias, but drift in yaw, scale and slip, and
+    nothing else shows the slip while it lasts.
     """
     wanted['imu'] = {
         'inhibit_accel_bias': True,
@@ -172,8 +174,17 @@ def _add_odometry_as_imu(wanted: dict[str, dict[str, Any]]) -> None:
         'gyro_bias_process_noise': 1e-5,
     }
     wanted['aiding'] = {'position_drift': 1.4, 'yaw_drift': 0.005, 'hold_yaw': 'never'}
-    wanted['gnss']['correlation_time'] = 3.0
-    wanted['gnss']['reset_at_start'] = False
+    wanted['gnss'].update(correlation_time=3.0, reset_at_start=False)
+
+
+def _add_odometry_beside_imu(wanted: dict[str, dict[str, Any]]) -> None:
+    """Add what neither odometry nor fixes say of their errors: that these last.
+
+    The velocity of odometry is wrong for long by scale and slip, fixes err by metres over tens of
+    seconds. Taken for white noise, the one makes position certain and the other passes for news.
+    """
+    wanted['aiding'] = {'position_drift': 0.7}
+    wanted['gnss'].update(correlation_time=1.0, reset_at_start=False)
 
 
 def age_limit_us(params: Params, role: str) -> int:

@@ -346,7 +346,11 @@ class Gnss:
         White noise of variance s^2 n at interval T has at low frequency the power of a first-order
         Markov process of variance s^2 and time constant tau where n = 2 tau / T.
         """
-        tau = self._f.params.gnss.correlation_time
+        f = self._f
+        tau = f.params.gnss.correlation_time
+        if not f.recent(f.observations.ev_hor_vel.last_fused_us, SECOND):
+            # inertial data alone drift faster than the errors of fixes change
+            return 1.0
         interval = max(time_us - self._previous_fix_us, 1) / SECOND
         return max(1.0, 2.0 * tau / interval)
 
