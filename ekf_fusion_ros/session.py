@@ -13,6 +13,7 @@ from typing import Any
 
 from ekf_fusion_ros.airspeed_conditions import check_airspeed
 from ekf_fusion_ros.completion import Completion
+from ekf_fusion_ros.down_check import DownCheck
 from ekf_fusion_ros.estimator import YAW_KNOWN_VARIANCE
 from ekf_fusion_ros.estimator import Estimator
 from ekf_fusion_ros.estimator import Event
@@ -141,6 +142,7 @@ class FusionSession:
             role: AidingOrder(lead_us, age_limit_us(self.params, role)) for role in roles}
         self._rates = SensorRates(minimum_rates(self.params.ekf2, frozenset(roles)))
         self._heading = OdometryHeading()
+        self._down = DownCheck(both=IMU in roles and ODOMETRY in roles)
         self._holding = Holding(round(1000 * session.hold_ms))
         self._completion = Completion(self.params.messages)
         self._intake = FixIntake(
@@ -319,6 +321,8 @@ class FusionSession:
 
     def _push_odometry(self, sample: VisionSample) -> None:
         self._heading.push(sample)
+        if self._down.open:
+            self._down.note_odometry(sample)
         jump = '' if self._inertial is None else self._inertial.jump()
         if jump:
             self._tell(sample.time_us, jump)
@@ -349,6 +353,8 @@ class FusionSession:
         assert self._inertial is not None
         outputs: list[FusedOutput] = []
         increments = self._inertial.push(reading)
+        if self._down.open and self._down.note_imu(increments):
+            self._tell(reading.time_us, self._down.sentence)
         if role == ODOMETRY:
             self._push_odometry(reading)
         holding, intake = self._holding, self._intake
@@ -531,10 +537,14 @@ class FusionSession:
     def health(self) -> Health:
         """Say in one sentence what the session is doing or waiting for."""
         health = self._estimator.health()
-        text, slow = self._waiting_for() or health.text, self._rates.slow()
-        fine = text == health.text and not slow
+        text, warnings = self._waiting_for() or health.text, self.warnings()
+        fine = text == health.text and not warnings
         return Health(health.level if fine else max(health.level, HealthLevel.WARN),
-                      '; '.join([text, *slow]), {**health.values, **self._rates.values()})
+                      '; '.join([text, *warnings]), {**health.values, **self._rates.values()})
+
+    def warnings(self) -> list[str]:
+        """Return what is wrong with the inputs, in sentences."""
+        return [*self._rates.slow(), *filter(None, [self._down.sentence])]
 
     def receivers(self) -> Sequence[ReceiverStatus]:
         """Return what becomes of each of several receivers, nothing where there is one."""

@@ -23,7 +23,7 @@ LAYERS = (
     ('messages',),
     (
         'session', 'airspeed_conditions', 'completion', 'fix_assembly', 'fix_intake',
-        'fused_output', 'holding', 'inputs', 'map_origin', 'navigation_watch', 'odometry_heading',
+        'down_check', 'fused_output', 'holding', 'inputs', 'map_origin', 'navigation_watch', 'odometry_heading',
         'pairing', 'roles', 'sample_check', 'sensor_rates', 'stamp_order', 'statistics', 'warm_up',
     ),
     ('live',),

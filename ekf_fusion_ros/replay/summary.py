@@ -63,6 +63,7 @@ def _content(
         'rows': progress.rows,
         'fix_distance': progress.fix_distance,
         'withheld_distance': progress.withheld_distance,
+        'warnings': session.warnings(),
         'notes': progress.notes,
         'cpu_seconds': progress.cpu_seconds,
         'kernel_loading_cpu_seconds': progress.kernel_seconds,
@@ -159,6 +160,7 @@ def _gist(summary: dict[str, Any]) -> list[str]:
         after = summary['first_output'] - summary['start']
         lines.append(f'{summary["rows"]} rows in frame {summary["frame"]}, the first '
                      f'{after:.1f} s after the start')
+    lines += [f'warning: {warning}' for warning in summary['warnings']]
     for which in ('fix', 'withheld'):
         distance = summary[f'{which}_distance']
         if distance is not None:
