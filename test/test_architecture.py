@@ -22,9 +22,9 @@ LAYERS = (
     ('ekf2', 'lpe', 'health', 'odometry_imu', 'motion_heading', 'receivers'),
     ('messages',),
     (
-        'session', 'airspeed_conditions', 'completion', 'fix_assembly', 'fix_intake',
-        'down_check', 'fused_output', 'holding', 'inputs', 'map_origin', 'navigation_watch', 'odometry_heading',
-        'pairing', 'roles', 'sample_check', 'sensor_rates', 'stamp_order', 'statistics', 'warm_up',
+        'session', 'airspeed_conditions', 'completion', 'down_check', 'fix_assembly',
+        'fix_intake', 'fused_output', 'holding', 'inputs', 'map_origin', 'navigation_watch',
+        'odometry_heading', 'pairing', 'roles', 'sample_check', 'sensor_rates', 'stamp_order', 'statistics', 'warm_up',
     ),
     ('live',),
     ('analysis',),
