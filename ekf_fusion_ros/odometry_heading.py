@@ -21,6 +21,11 @@ class OdometryHeading:
         """True once an odometry sample has come."""
         return self._newest is not None
 
+    @property
+    def has_attitude(self) -> bool:
+        """True where the newest odometry sample tells how the body lies in its frame."""
+        return self._newest is not None and self._newest.has_attitude
+
     def push(self, sample: VisionSample) -> None:
         """Note an odometry sample."""
         self._newest = sample

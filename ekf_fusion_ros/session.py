@@ -43,9 +43,12 @@ from ekf_fusion_ros.receivers.bank import ReceiverStatus
 from ekf_fusion_ros.roles import AIRSPEED
 from ekf_fusion_ros.roles import ARMED
 from ekf_fusion_ros.roles import FIX
+from ekf_fusion_ros.roles import FIX_VELOCITY
 from ekf_fusion_ros.roles import FIXES
+from ekf_fusion_ros.roles import GPS_HEADING
 from ekf_fusion_ros.roles import IMU
 from ekf_fusion_ros.roles import LANDED
+from ekf_fusion_ros.roles import MAGNETIC_FIELD
 from ekf_fusion_ros.roles import ODOMETRY
 from ekf_fusion_ros.roles import PARTS_OF_FIX
 from ekf_fusion_ros.roles import WITHOUT_STAMP
@@ -72,6 +75,8 @@ if TYPE_CHECKING:
 
 SECOND_US = 1_000_000
 NO_HEIGHT_EPV = 1e3
+YAW_WITHOUT_ODOMETRY = frozenset((FIX_VELOCITY, GPS_HEADING, MAGNETIC_FIELD))
+"""Roles that tell the yaw of the body by themselves."""
 
 
 class FusionSession:
@@ -571,8 +576,18 @@ class FusionSession:
         if role:
             return f'waiting for {role}: {self._statistics[role].summary()}'
         nav = self._estimator.nav_state()
-        aligned = nav is not None and nav.yaw_aligned
-        return '' if aligned or self._motion is None else self._motion.status().text
+        if self._motion is None or (nav is not None and nav.yaw_aligned):
+            return ''
+        return self._missing_for_yaw() or self._motion.status().text
+
+    def _missing_for_yaw(self) -> str:
+        """Say what to add where no topic in use ties the yaw of an IMU to anything."""
+        roles = self.roles or frozenset()
+        if IMU not in roles or not self._heading.known or self._heading.has_attitude \
+                or roles & YAW_WITHOUT_ODOMETRY:
+            return ''
+        return ('the yaw cannot be aligned: the odometry has no orientation; add a topic of '
+                f'{", ".join(sorted(YAW_WITHOUT_ODOMETRY))}, or leave the imu out')
 
     def _collect(self) -> None:
         self._events += self._estimator.drain_events()

@@ -63,6 +63,7 @@ def _content(
         'rows': progress.rows,
         'fix_distance': progress.fix_distance,
         'withheld_distance': progress.withheld_distance,
+        'health': session.health().text,
         'warnings': session.warnings(),
         'notes': progress.notes,
         'cpu_seconds': progress.cpu_seconds,
@@ -193,4 +194,4 @@ def _missing(summary: dict[str, Any]) -> str:
         return 'the filter never started'
     if summary['origin'] is None:
         return 'the origin was never set'
-    return 'the yaw was never aligned'
+    return f'the yaw was never aligned ({summary["health"]})'

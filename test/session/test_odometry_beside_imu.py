@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from ekf_fusion_ros.params import Params
+from ekf_fusion_ros.samples import NAN3
+from ekf_fusion_ros.samples import NAN4
 from ekf_fusion_ros.session import FusionSession
 from ekf_fusion_ros.simulation.scenario import Scenario
 from ekf_fusion_ros.simulation.scenario import default_sensors
@@ -57,3 +59,17 @@ def test_errors_are_of_the_size_that_is_stated(scale):
     assert np.mean(nees) < 3.88
     # the fixes err by 1.3 m along each axis
     assert np.sqrt(np.mean(squares)) < 1.84
+
+
+@pytest.mark.parametrize(('roles', 'told'), [(ROLES, True), ((*ROLES, 'magnetic_field'), False)])
+def test_a_yaw_that_nothing_tells_is_named(roles, told):
+    sensors = default_sensors(roles)
+    sensors['fix'] = replace(sensors['fix'], has_velocity=False)
+    flight = Scenario(trajectory=Flight(duration=40.0, height=15.0), sensors=sensors, seed=1)
+    session = FusionSession(Params(), list(roles))
+    for arrival in flight.arrivals():
+        lost = {'quaternion': NAN4, 'velocity': NAN3} if arrival.role == 'odometry' else {}
+        session.push(arrival.sample._replace(**lost))
+    assert ('the odometry has no orientation; add a topic of fix_velocity'
+            in session.health().text) == told
+    assert session.estimator.nav_state().yaw_aligned != told
