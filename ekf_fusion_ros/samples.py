@@ -23,6 +23,15 @@ UNTOLD_POSITION_VAR.flags.writeable = False
 UNTOLD_VELOCITY_COV = 0.1 * np.eye(3)
 UNTOLD_VELOCITY_COV.flags.writeable = False
 NO_CLIPPING = (False, False, False)
+TRAVELLING_SPEED = 1.0
+SIGNIFICANT = 3.0
+"""m/s and sigmas above which a speed is none of a body at rest."""
+
+
+def travels(velocity: Array, sacc: float) -> bool:
+    """True where the horizontal velocity of a fix with 1-sigma sacc, m/s, is not that of rest."""
+    speed = math.hypot(float(velocity[0]), float(velocity[1]))
+    return speed > max(TRAVELLING_SPEED, SIGNIFICANT * sacc)
 
 
 class VelocityFrame(Enum):

@@ -8,13 +8,12 @@ from __future__ import annotations
 import math
 
 from ekf_fusion_ros.ekf2.filter import Filter
+from ekf_fusion_ros.samples import SIGNIFICANT
 from ekf_fusion_ros.samples import LandedSample
+from ekf_fusion_ros.samples import travels
 
-FLIGHT_SPEED = 1.0
 FLIGHT_HEIGHT = 1.0
 ROLLING_SPEED = 0.2
-SIGNIFICANT = 3.0
-"""A speed counts from this many of its sigmas on."""
 
 
 class GroundContact:
@@ -74,10 +73,7 @@ class GroundContact:
     def _travels(self) -> bool:
         """Return whether the latest fix moves."""
         fix = self._f.fix
-        if fix is None or not fix.has_velocity:
-            return False
-        speed = math.hypot(float(fix.velocity[0]), float(fix.velocity[1]))
-        return speed > max(FLIGHT_SPEED, SIGNIFICANT * fix.sacc)
+        return fix is not None and fix.has_velocity and travels(fix.velocity, fix.sacc)
 
     def _set(self, in_air: bool) -> None:
         f = self._f

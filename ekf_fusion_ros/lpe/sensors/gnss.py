@@ -19,14 +19,12 @@ from ekf_fusion_ros.lpe.state import SIZE
 from ekf_fusion_ros.mathlib.rotation import cross
 from ekf_fusion_ros.samples import Antenna
 from ekf_fusion_ros.samples import GnssSample
+from ekf_fusion_ros.samples import travels
 
 Array = NDArray[np.float64]
 C = np.eye(6, SIZE)
 LEAST_SATELLITES = 6
 FIX_3D = 3
-TRAVELLING_SPEED = 1.0
-SIGNIFICANT = 3.0
-"""m/s and sigmas above which a speed is none of a body at rest."""
 
 
 class Gnss(Sensor):
@@ -67,8 +65,7 @@ class Gnss(Sensor):
         if not fix.has_velocity:
             return
         sacc = fix.sacc if math.isfinite(fix.sacc) else self._f.params.gnss.noise_vxy
-        speed = math.hypot(float(fix.velocity[0]), float(fix.velocity[1]))
-        if speed > max(TRAVELLING_SPEED, SIGNIFICANT * sacc):
+        if travels(fix.velocity, sacc):
             self._moved_us = self._f.now_us
 
     def gather(self, measured: GnssSample) -> bool:
