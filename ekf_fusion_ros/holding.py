@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import heapq
 from typing import Any
 
+from ekf_fusion_ros.buffer import NEVER
 from ekf_fusion_ros.roles import SUPPORTED
 
 HELD_MAX = 1000
@@ -17,24 +18,22 @@ class Holding:
 
     Middleware does not keep the order of messages across topics. Held this long, and ordered by
     stamp and role, they reach the estimator in one order however they arrived, so that node
-    and replay give the same numbers. The fusion horizon lies further back than the hold.
+    and replay give the same numbers. The fusion horizon lies further back than the hold. `due_us`:
+    the inertial stamp from which `release` has something to give, NEVER where nothing is held.
     """
 
     def __init__(self, hold_us: int) -> None:
         self._hold_us = hold_us
         self._heap: list[tuple[int, int, int, str, Any]] = []
         self._sequence = 0
+        self.due_us = NEVER
 
     def push(self, role: str, sample: Any) -> None:
         """Hold a sample."""
         self._sequence += 1
         entry = (sample.time_us, RANK[role], self._sequence, role, sample)
         heapq.heappush(self._heap, entry)
-
-    def due(self, now_us: int) -> bool:
-        """Return whether `release` has something to give."""
-        heap = self._heap
-        return bool(heap) and (heap[0][0] + self._hold_us <= now_us or len(heap) > HELD_MAX)
+        self._note_due()
 
     def release(self, now_us: int | None) -> Sequence[tuple[str, Any]]:
         """Return what is due before the inertial stamp `now_us`; None: before there is one."""
@@ -42,10 +41,16 @@ class Holding:
         heap, due = self._heap, []
         while heap and (heap[0][0] <= limit or len(heap) > HELD_MAX):
             due.append(heapq.heappop(heap)[3:])
+        if due:
+            self._note_due()
         return due
 
     def flush(self) -> Sequence[tuple[str, Any]]:
         """Return everything, oldest stamp first."""
         due = [entry[3:] for entry in sorted(self._heap)]
         self._heap.clear()
+        self.due_us = NEVER
         return due
+
+    def _note_due(self) -> None:
+        self.due_us = self._heap[0][0] + self._hold_us if self._heap else NEVER

@@ -364,7 +364,7 @@ class FusionSession:
             self._push_odometry(reading)
         holding, intake = self._holding, self._intake
         for imu in increments:
-            if holding.due(imu.time_us):
+            if imu.time_us >= holding.due_us:
                 for due in holding.release(imu.time_us):
                     self._aid(*due)
             if intake.waiting:

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.events import EventKind
 from ekf_fusion_ros.ekf2.filter import Filter
-from ekf_fusion_ros.ekf2.report import attitude_error_jacobian
 from ekf_fusion_ros.ekf2.resets import Resets
 from ekf_fusion_ros.ekf2.state import PD
 from ekf_fusion_ros.ekf2.state import PN
 from ekf_fusion_ros.ekf2.state import VN
 from ekf_fusion_ros.estimator import YAW_KNOWN_VARIANCE
 from ekf_fusion_ros.estimator import GivenPose
+from ekf_fusion_ros.kernels.navigation import attitude_error_jacobian
 from ekf_fusion_ros.mathlib.angles import wrap_pi
 from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
 from ekf_fusion_ros.mathlib.rotation import yaw_of

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.kernels.compile import machine_code
+from ekf_fusion_ros.kernels.navigation import SIZE
+from ekf_fusion_ros.kernels.navigation import navigation
 from ekf_fusion_ros.kernels.output import OUTPUT
 from ekf_fusion_ros.kernels.output import propagate_predictor
 from ekf_fusion_ros.kernels.period import finish_period
@@ -43,6 +45,7 @@ class OutputPredictor:
         self.tracking_error: Array = output['tracking_error']
         self._history = np.zeros((history, 10))
         self._finish_period = machine_code(finish_period)
+        self._navigation = machine_code(navigation)
 
     def align(self, x: Array) -> None:
         """Start from the filter state (24,)."""
@@ -64,6 +67,12 @@ class OutputPredictor:
         """
         self._finish_period(self.state, self._history, f.x, raw, f.dt_imu_avg, f.dt_avg, delay,
                             bank.models, f.imu.increments, airspeed)
+
+    def navigation(self, x: Array, p: Array, dt_avg: float) -> Array:
+        """Return (67,) what `kernels.navigation` makes of the output, states and covariance."""
+        row = np.empty(SIZE)
+        self._navigation(self.state, x, p, dt_avg, row)
+        return row
 
     def velocity_at_origin(self, imu_position: Array) -> Array:
         """Return the velocity (3,) of the body origin, given the IMU position (3,) in the body."""

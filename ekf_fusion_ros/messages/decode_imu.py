@@ -17,6 +17,7 @@ from ekf_fusion_ros.messages.flat import FlatMessage
 from ekf_fusion_ros.messages.flat import FlatRows
 from ekf_fusion_ros.messages.flat import elements
 from ekf_fusion_ros.messages.flat import flat_message
+from ekf_fusion_ros.messages.flat import named
 from ekf_fusion_ros.messages.flat import xyz
 from ekf_fusion_ros.messages.flat import xyzw
 from ekf_fusion_ros.messages.mounting import body_to_sensor_quaternion
@@ -109,9 +110,9 @@ def decode_imu_rows(rows: FlatRows, params: MessageParams) -> list[ImuReading | 
     intervals = np.diff(times, prepend=times[:1]) * 1e-6
     angles, velocities = rates * intervals[:, None], forces * intervals[:, None]
     stamps, dt = times.tolist(), intervals.tolist()
-    increments = map(ImuSample._make, zip(
+    increments = named(ImuSample, zip(
         stamps, angles, velocities, dt, dt, repeat(NO_CLIPPING), orientations, strict=False))
-    readings = map(ImuReading._make, zip(
+    readings = named(ImuReading, zip(
         stamps, rates, forces, orientations, increments, [-1, *stamps[:-1]], strict=True))
     return [reading if plain else None
             for plain, reading in zip(good.tolist(), readings, strict=True)]

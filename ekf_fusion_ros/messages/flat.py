@@ -6,9 +6,13 @@ rules of the decoders work on it, so that they exist once.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from collections.abc import Iterator
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 from typing import NamedTuple
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +21,7 @@ from ekf_fusion_ros.messages.refusal import Refused
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Record = TypeVar('Record', bound=tuple[Any, ...])
 
 
 class FlatMessage(NamedTuple):
@@ -48,6 +53,14 @@ class FlatRows(NamedTuple):
         """Return one message."""
         return FlatMessage(int(self.sec[index]), int(self.nanosec[index]), self.frame_id,
                            self.numbers[index].tolist(), self.child_frame_id)
+
+
+def named(kind: type[Record], rows: Iterable[tuple[Any, ...]]) -> Iterator[Record]:
+    """Yield rows as named tuples; each must hold all fields of `kind`, which nothing checks.
+
+    At a third of the cost of `_make` for each.
+    """
+    return map(partial(tuple.__new__, kind), rows)
 
 
 def flat_message(message: Any, numbers: Sequence[float], child_frame_id: str = '') -> FlatMessage:

@@ -50,7 +50,7 @@ from ekf_fusion_ros.warm_up import warm_up
 CSV_SUFFIXES = ('.csv', '.csv.gz')
 # Reading, filtering and writing take turns: a processor repeats a task faster than it switches,
 # and the messages of a topic that are decoded together share the cost of each numpy call.
-BATCH = 1024
+BATCH = 2048
 COMPILE_NOTICE_AFTER = 3.0
 COMPILE_NOTICE = 'compiling the numeric kernels: a minute or so, once; the result is cached'
 Say = Callable[[str], None]

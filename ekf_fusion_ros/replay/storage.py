@@ -73,7 +73,7 @@ class Recording:
         streams = [part.messages(frozenset(topics), self.notes) for part in self._parts]
         merged = streams[0] if len(streams) == 1 else heapq.merge(*streams, key=itemgetter(0))
         for time_ns, topic, data in merged:
-            yield time_ns, topic, _plain(data) if data[:4] == ZSTD_MAGIC else data
+            yield time_ns, topic, _plain(data) if data.startswith(ZSTD_MAGIC) else data
 
     def close(self) -> None:
         """Release files."""

@@ -27,9 +27,9 @@ from ekf_fusion_ros.ekf2.delayed_imu import DelayedImu
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.heading import HeadingFusion
 from ekf_fusion_ros.ekf2.heading import mag_yaw
-from ekf_fusion_ros.ekf2.report import attitude_error_jacobian
-from ekf_fusion_ros.ekf2.report import pose_covariance
 from ekf_fusion_ros.kernels.heading import yaw_gradient
+from ekf_fusion_ros.kernels.navigation import attitude_error_jacobian
+from ekf_fusion_ros.kernels.navigation import pose_covariance
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 
 Rotation = pytest.importorskip('scipy.spatial.transform').Rotation
