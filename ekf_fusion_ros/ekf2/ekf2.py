@@ -121,7 +121,7 @@ class Ekf2:
         if not complete and self.initialised:
             return False
         f.dt_imu_avg = inertial.dt_avg
-        f.flags.vehicle_at_rest = inertial.at_rest
+        f.flags.vehicle_at_rest = inertial.at_rest and not self._ground_contact.moves_evenly()
         if complete:
             f.t_horizon = inertial.ring[0].time_us
             if self.control.drag.enabled:

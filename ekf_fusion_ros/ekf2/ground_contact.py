@@ -30,6 +30,7 @@ class GroundContact:
         self._rest_down = 0.0
         vehicle = f.params.aiding.vehicle
         self._is_rover = vehicle == 'rover'
+        self._infers = f.params.aiding.infer_in_air
         self._on_wings = f.flags.fixed_wing = vehicle == 'fixed_wing'
         self._zero_sideslip = self._on_wings and f.params.air_data.use_sideslip
 
@@ -53,13 +54,17 @@ class GroundContact:
             f.last_on_ground_us = f.t_now
         if self._is_rover:
             self._set(self._rolls() or (not quiet and (f.flags.in_air or self._travels())))
-        elif not f.params.aiding.infer_in_air:
+        elif not self._infers:
             return
         elif quiet:
             self._rest_down = float(f.x[9])
             self._set(False)
         else:
             self._set(f.flags.in_air or self._climbs() or self._travels())
+
+    def moves_evenly(self) -> bool:
+        """True where the estimate moves, whatever the inertial sensors say of rest."""
+        return self._infers and self._f.flags.tilt_align and self._rolls()
 
     def _climbs(self) -> bool:
         return abs(float(self._f.x[9]) - self._rest_down) > FLIGHT_HEIGHT

@@ -76,8 +76,8 @@ def _state(ekf: Ekf2) -> tuple[HealthLevel, str]:
         return HealthLevel.WARN, 'aligning yaw'
     wants_gnss = ekf.params.gnss.enabled
     if wants_gnss and not f.earth.has_origin:
-        failed = [n for n, r in ekf.control.checks.results.items() if r.failed]
-        reason = f' ({", ".join(failed)} failing)' if failed else ''
+        failing = ', '.join(ekf.control.checks.blocking())
+        reason = f' ({failing} failing)' if failing else ''
         return HealthLevel.WARN, f'waiting for the GNSS checks to pass{reason}'
     if f.dead_reckoning:
         seconds = (f.t_now - f.last_aiding_us) * 1e-6 if f.last_aiding_us else math.inf

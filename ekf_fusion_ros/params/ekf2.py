@@ -393,7 +393,7 @@ class AidingParams:
         'airspeed of a multirotor is not used.', choices=VEHICLES)
     infer_in_air: bool = param(
         True, 'Take a moving vehicle to be in the air, one at rest to be on the ground, until a '
-        'landed sample says which.')
+        'landed sample says which; do not take an even motion for rest.')
     reset_timeout: float = param(7.0, 'Time without accepted aiding before a reset.', unit='s',
                                  min=1, max=60, live=True)
     position_drift: float = param(

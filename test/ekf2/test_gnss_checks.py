@@ -95,3 +95,15 @@ def test_drift_is_low_passed_with_ten_seconds():
     f.flags.in_air = True
     checks.run(GnssSample(f.t_now + 200_000, 48.0, 8.0, 400.0, eph=1.0, epv=2.0))
     assert checks.results['hdrift'].failed is False
+
+
+def test_a_check_that_is_not_selected_is_not_blamed():
+    bench = Bench(checked_only('nsats'))
+    bench.run(4.0)
+    bench.sending.add('fix')
+    for _ in range(25):
+        spoil(bench, 'nsats')
+        spoil(bench, 'hdrift')
+        bench.run(0.2)
+    assert bench.ekf.control.checks.results['hdrift'].failed
+    assert bench.ekf.health().text.endswith('(nsats failing)')

@@ -67,6 +67,20 @@ def test_quiet_means_landed(bench):
     assert 'vehicle_at_rest' in bench.flags
 
 
+@pytest.mark.parametrize(('infers', 'rests'), [(True, False), (False, True)])
+def test_even_motion_is_no_rest(infers, rests):
+    bench = Bench(Ekf2Params(aiding=AidingParams(infer_in_air=infers)))
+    bench.sending.add('fix')
+    bench.run(12.0)
+    assert 'vehicle_at_rest' in bench.flags
+    bench.travel(2.0, 6.0)
+    assert 'in_air' not in bench.flags
+    assert ('vehicle_at_rest' in bench.flags) is rests
+    assert bool(bench.ekf.control.checks.results['hdrift'].failed) is rests
+    bench.travel(0.0, 6.0)
+    assert 'vehicle_at_rest' in bench.flags
+
+
 def test_what_is_told_counts(bench):
     bench.ekf.push(LandedSample(bench.now_us, landed=True))
     bench.fix.velocity = np.array((0.0, 5.0, 0.0))
