@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from collections.abc import Sequence
 from dataclasses import dataclass
+from dataclasses import replace
 from enum import IntEnum
 import math
 from typing import Any
@@ -34,6 +35,10 @@ class GeoPoint:
     def on_earth(self) -> bool:
         """True for a latitude, longitude and altitude that exist."""
         return abs(self.lat) <= 90.0 and abs(self.lon) <= 180.0 and math.isfinite(self.alt)
+
+    def completed(self, alt: float) -> GeoPoint:
+        """Return this point, at `alt` where its own altitude is NaN: left open."""
+        return replace(self, alt=alt) if math.isnan(self.alt) else self
 
 
 @dataclass(frozen=True, slots=True, eq=False)

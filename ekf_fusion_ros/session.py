@@ -408,6 +408,7 @@ class FusionSession:
             return None
         if self._home is None:
             self._home = nav.origin
+        self._home = self._home.completed(nav.origin.alt)
         if nav.origin != self._home and self._estimator.set_origin(self._home):
             return self._estimator.nav_state()
         return nav
@@ -442,10 +443,14 @@ class FusionSession:
         """Move the origin of the map frame; False where the point is unusable.
 
         The place of the vehicle on the earth stays. Before a fix has placed the vehicle on the
-        earth the origin waits for it.
+        earth the origin waits for it. An altitude of NaN is left open: the origin keeps the one
+        that it has, or would have got.
         """
-        if not origin.on_earth:
+        if not origin.completed(0.0).on_earth:
             return False
+        present = self._home or self.origin
+        if present is not None:
+            origin = origin.completed(present.alt)
         waits = not self._local and self.origin is None
         moved = waits or self._estimator.set_origin(origin)
         if moved:

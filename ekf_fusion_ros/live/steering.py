@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+import math
 from typing import Any
 
 from ekf_fusion_ros.estimator import GeoPoint
@@ -61,9 +62,12 @@ class Steering:
         return self._switches.obstacle(role, on)
 
     def set_origin(self, point: GeoPoint) -> str:
-        """Move the origin of the map; the place of the vehicle on the earth stays."""
+        """Move the origin of the map; the place of the vehicle on the earth stays.
+
+        An altitude of NaN, which geographic_msgs calls unspecified, leaves that of the origin.
+        """
         place = words_of(point)
-        if not point.on_earth:
+        if not point.completed(0.0).on_earth:
             return f'{place} is not a point of the earth: {GIVE_POINT}'
         if self._session.local:
             return LOCAL
@@ -120,4 +124,5 @@ class Steering:
 
 def words_of(point: GeoPoint) -> str:
     """Return a point in words."""
-    return f'latitude {point.lat}, longitude {point.lon}, altitude {point.alt}'
+    altitude = 'unspecified' if math.isnan(point.alt) else point.alt
+    return f'latitude {point.lat}, longitude {point.lon}, altitude {altitude}'

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from math import nan
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 from typing import Any
@@ -162,7 +163,7 @@ def test_origin_pose_and_reset(operator: Operator) -> None:
     operator.drive_until(lambda: bool(peer.odometry))
     operator.request(
         NavSatFix, '/fuser/set_origin',
-        NavSatFix(latitude=47.001, longitude=8.0, altitude=400.0))
+        NavSatFix(latitude=47.001, longitude=8.0, altitude=nan))
     operator.hears('origin of the map set on request: latitude 47.001')
     operator.drive(20)
     # A thousandth of a degree of latitude is 111.2 m at 47 N.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -62,6 +64,17 @@ def test_an_origin_set_in_flight_moves_the_map(build, estimator):
     assert session.set_origin(DATUM)
     outputs = drive(session, build, START + 1.01, START + 2)
     assert {output.nav.origin for output in outputs} == {DATUM}
+
+
+@pytest.mark.parametrize('first', [0.0, 1.0])
+def test_an_origin_whose_altitude_is_left_open_keeps_the_one_of_the_map(build, estimator, first):
+    session = session_of(estimator)
+    if first:
+        drive(session, build, START, START + first)
+    assert session.set_origin(GeoPoint(46.99, 8.01, math.nan))
+    assert not session.set_origin(GeoPoint(math.nan, 8.01, math.nan))
+    outputs = drive(session, build, START + first + 0.01, START + 2)
+    assert {output.nav.origin for output in outputs} == {GeoPoint(46.99, 8.01, 500.0)}
 
 
 @pytest.mark.parametrize(('keep', 'lat', 'words'), [
