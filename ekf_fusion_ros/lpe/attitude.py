@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from ekf_fusion_ros.geo.magnetic_field import make_field
 from ekf_fusion_ros.lpe.attitude_filter import AttitudeFilter
+from ekf_fusion_ros.lpe.gravity import ForceHistory
+from ekf_fusion_ros.lpe.gravity import Gravity
 from ekf_fusion_ros.lpe.state import SECOND
 from ekf_fusion_ros.mathlib.angles import wrap_pi
 from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
@@ -28,8 +30,10 @@ Array = NDArray[np.float64]
 SOURCE_AGE_US = SECOND
 """Time after which a source that is silent makes way for the next."""
 
-FIXES_APART = (0.05, 1.5)
-"""s between two fixes whose velocities tell the acceleration."""
+FIX_WINDOW_US = 0
+FLOW_WINDOW_US = SECOND // 2
+ESTIMATE_WINDOW_US = SECOND // 10
+"""Windows over which velocities are averaged before they tell gravity."""
 
 UNKNOWN_YAW_VARIANCE = math.pi ** 2 / 3.0
 
@@ -57,8 +61,10 @@ class Attitude:
         self._heading: tuple[float, float] | None = (0.0, 0.0) if params.odometry_yaw else None
         self._declination = math.radians(params.declination_deg)
         self._place_known = False
-        self._fix: GnssSample | None = None
-        self._acceleration = np.zeros(3)
+        self._force = ForceHistory()
+        self._by_fixes = Gravity(self._force, FIX_WINDOW_US)
+        self._by_flow = Gravity(self._force, FLOW_WINDOW_US)
+        self._by_estimate = Gravity(self._force, ESTIMATE_WINDOW_US)
 
     @property
     def ready(self) -> bool:
@@ -123,18 +129,25 @@ class Attitude:
         self._take_heading(sample.time_us, self._declination + magnetic, relative=True)
         return True
 
-    def push_fix(self, fix: GnssSample) -> None:
-        """Take from a fix the yaw of two antennas, the acceleration, and the declination."""
+    def push_fix(self, fix: GnssSample, delay_us: int) -> None:
+        """Take from a fix the yaw of two antennas, the velocity, and the declination."""
         if self.source == 'filter' and math.isfinite(fix.yaw):
             self._take_heading(fix.time_us, fix.yaw, relative=False)
-        before, self._fix = self._fix, fix
-        if before is not None and before.has_velocity and fix.has_velocity:
-            dt = 1e-6 * (fix.time_us - before.time_us)
-            known = FIXES_APART[0] <= dt <= FIXES_APART[1] and np.isfinite(fix.velocity).all()
-            self._acceleration = (fix.velocity - before.velocity) / dt if known else np.zeros(3)
+        if self.source == 'filter' and fix.has_velocity and np.isfinite(fix.velocity).all():
+            self._by_fixes.note(fix.time_us - delay_us, fix.velocity)
         if self.params.declination_from_table and not self._place_known:
             self._place_known = True
             self._declination = make_field('ecl_table', 0.0).lookup(fix.lat, fix.lon).declination
+
+    def push_flow(self, time_us: int, velocity: Array) -> None:
+        """Take a velocity (3,) m/s NED that optical flow has measured."""
+        if self.source == 'filter':
+            self._by_flow.note(time_us, velocity)
+
+    def push_estimate(self, time_us: int, velocity: Array) -> None:
+        """Take a valid velocity (3,) m/s NED of the estimate."""
+        if self.source == 'filter':
+            self._by_estimate.note(time_us, velocity)
 
     def take_yaw(self, yaw: float, variance: float) -> None:
         """Turn to a yaw in rad that somebody knows."""
@@ -203,9 +216,18 @@ class Attitude:
         if not self._filter.ready:
             self._filter.level(force)
         else:
-            self._filter.steady(imu.time_us, force, self._acceleration, self.rate,
+            self._force.carry(imu.time_us, self.rot @ imu.delta_velocity)
+            self._filter.steady(imu.time_us, self._gravity(imu.time_us, force), self.rate,
                                 imu.delta_angle_dt, self.params)
         self.source = 'filter' if self._filter.ready else ''
+
+    def _gravity(self, now_us: int, force: Array) -> Array:
+        """Return gravity (3,) m/s^2 in the body; without velocities as if nothing accelerated."""
+        for told in (self._by_fixes, self._by_flow, self._by_estimate):
+            gravity = told.at(now_us)
+            if gravity is not None:
+                return self.rot.T @ gravity
+        return -force
 
     def _take_heading(self, time_us: int, heading: float, *, relative: bool) -> None:
         """Take a yaw in rad, or (relative) how far ours is from it."""

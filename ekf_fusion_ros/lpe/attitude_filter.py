@@ -81,16 +81,13 @@ class AttitudeFilter:
         self.take(quat_normalise(turned))
 
     def steady(
-        self, time_us: int, force: Array, acceleration: Array, rate: Array, dt: float,
-        params: AttitudeParams,
+        self, time_us: int, gravity: Array, rate: Array, dt: float, params: AttitudeParams,
     ) -> None:
         """Turn towards gravity and the last heading over dt s.
 
-        force (3,) m/s^2 body, acceleration (3,) m/s^2 NED of the vehicle as far as it is known,
-        rate (3,) rad/s body.
+        gravity (3,) m/s^2 body as it is measured, rate (3,) rad/s body.
         """
         correction = ZERO
-        gravity = self.rot.T @ acceleration - force
         if self._is_gravity(gravity):
             measured = gravity / np.linalg.norm(gravity)
             correction = params.accel_gain * cross(measured, self.rot.T @ DOWN)

@@ -24,6 +24,7 @@ from ekf_fusion_ros.lpe.report import nav_state
 from ekf_fusion_ros.lpe.sensors.suite import Suite
 from ekf_fusion_ros.lpe.state import PD
 from ekf_fusion_ros.lpe.state import POSITION
+from ekf_fusion_ros.lpe.state import SECOND
 from ekf_fusion_ros.lpe.state import SIZE
 from ekf_fusion_ros.lpe.state import TERRAIN
 from ekf_fusion_ros.lpe.state import VELOCITY
@@ -81,7 +82,7 @@ class Lpe:
         if isinstance(sample, VisionSample):
             used = attitude.push_odometry(sample)
         elif isinstance(sample, GnssSample):
-            attitude.push_fix(sample)
+            attitude.push_fix(sample, round(SECOND * self.params.gnss.delay))
         sensor_of = self.sensors.takes.get(type(sample))
         if sensor_of is None:
             self._pass_over(type(sample), 'no_such_sensor')
@@ -109,6 +110,8 @@ class Lpe:
         f.check()
         f.predict(imu)
         sensors.step()
+        if f.valid.horizontal:
+            f.attitude.push_estimate(f.now_us, f.x[VELOCITY])
         f.history.note(f.now_us, f.x)
         return True
 

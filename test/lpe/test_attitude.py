@@ -99,7 +99,7 @@ def fix(time_us, **changes):
 
 def test_the_declination_comes_from_the_table_with_the_first_fix():
     body = Body(yaw=0.5)
-    body.run(0.1).attitude.push_fix(fix(body.time_us))
+    body.run(0.1).attitude.push_fix(fix(body.time_us), 0)
     body.run(60.0, field=FIELD)
     declination = EclFieldTable.load().lookup(47.4, 8.5).declination
     assert body.angles()[2] == pytest.approx(math.degrees(0.5 + declination), abs=0.2)
@@ -107,7 +107,7 @@ def test_the_declination_comes_from_the_table_with_the_first_fix():
 
 def test_two_antennas_tell_yaw():
     body = Body(yaw=-2.0).run(0.1)
-    body.attitude.push_fix(fix(body.time_us, yaw=-2.0, yaw_accuracy=0.02))
+    body.attitude.push_fix(fix(body.time_us, yaw=-2.0, yaw_accuracy=0.02), 0)
     assert body.angles()[2] == pytest.approx(math.degrees(-2.0), abs=0.01)
     assert body.attitude.yaw_aligned
 
@@ -119,7 +119,8 @@ def test_a_known_acceleration_is_not_taken_for_tilt():
         for k in range(500):
             t = START_US + 10_000 * k
             if velocity_known and k % 20 == 0:
-                attitude.push_fix(fix(t, velocity=np.array((0.015 * k, 0.0, 0.0)), sacc=0.1))
+                attitude.push_fix(
+                    fix(t, velocity=np.array((0.015 * k, 0.0, 0.0)), sacc=0.1), 0)
             force = ahead if k else rest
             attitude.step(ImuSample(t, np.zeros(3), force * DT, DT, DT))
         return abs(math.degrees(euler_321(attitude.rot)[1]))

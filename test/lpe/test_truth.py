@@ -9,6 +9,11 @@ import pytest
 
 from ekf_fusion_ros.ekf2.ekf2 import Ekf2
 from ekf_fusion_ros.lpe.lpe import Lpe
+from ekf_fusion_ros.params.lpe import FlowParams
+from ekf_fusion_ros.params.lpe import GnssParams
+from ekf_fusion_ros.params.lpe import LpeParams
+from ekf_fusion_ros.samples import NAN3
+from ekf_fusion_ros.samples import GnssSample
 from ekf_fusion_ros.samples import LandedSample
 from ekf_fusion_ros.simulation.scenario import Scenario
 from ekf_fusion_ros.simulation.scenario import default_sensors
@@ -68,3 +73,28 @@ def test_its_own_attitude_filter_is_good_to_three_degrees(fly):
     flown = fly(Lpe(), scenario_of(FLIGHT, 5), true_attitude=False).after(60.0)
     assert np.sqrt(np.mean(flown.angle ** 2)) < 3.0
     assert flown.rms(HORIZONTAL) < 1.5
+
+
+@pytest.mark.slow
+def test_fixes_without_velocity_keep_its_attitude_filter_upright(fly):
+    """In turns of 3 m/s^2 RMS, which without any velocity pass for 17 deg of tilt."""
+    def position_only(sample):
+        return sample._replace(velocity=NAN3) if isinstance(sample, GnssSample) else sample
+
+    turns = replace(FLIGHT, size=20.0, period=20.0)
+    flown = fly(Lpe(), scenario_of(turns, 6), true_attitude=False, change=position_only)
+    flown = flown.after(60.0)
+    assert np.sqrt(np.mean(flown.angle ** 2)) < 1.5
+    assert flown.rms(HORIZONTAL) < 1.5
+
+
+def test_flow_alone_keeps_its_attitude_filter_upright(fly):
+    """Without a fix the declination is unknown, so that it flies 2.6 deg off true north."""
+    sensors = default_sensors(('imu', 'magnetic_field', 'pressure', 'range', 'flow'))
+    flight = Flight(duration=60.0, size=20.0, period=30.0, height=5.0, landing=15.0)
+    scenario = Scenario(trajectory=flight, sensors=sensors, seed=1)
+    lpe = Lpe(LpeParams(flow=FlowParams(enabled=True), gnss=GnssParams(enabled=False)))
+    flown = fly(lpe, scenario, true_attitude=False, local=True).after(20.0)
+    aloft = flown.time < 40.0
+    assert np.sqrt(np.mean(flown.angle[aloft] ** 2)) < 3.5
+    assert np.sqrt(np.mean(flown.velocity[aloft, HORIZONTAL] ** 2)) < 0.3

@@ -65,6 +65,9 @@ class OpticalFlow(Sensor):
         distance = f.agl / float(rot[2, 2])
         x, y = (params.scale * sample.flow + rotation) * (distance / sample.dt)
         velocity = np.array((-y, x))
+        body = rot.T @ f.x[VELOCITY]
+        body[:2] = velocity
+        f.attitude.push_flow(sample.time_us - round(0.5 * SECOND * sample.dt), rot @ body)
         return Seen(velocity, self._variance(velocity, roll, pitch))
 
     def model(self, measured: Seen) -> Measurement:
