@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from ekf_fusion_ros.samples import AirspeedSample
     from ekf_fusion_ros.samples import AuxVelocitySample
     from ekf_fusion_ros.samples import BaroSample
+    from ekf_fusion_ros.samples import DriftSample
     from ekf_fusion_ros.samples import FlowSample
     from ekf_fusion_ros.samples import GnssSample
     from ekf_fusion_ros.samples import HeadingSample
@@ -53,6 +54,7 @@ _HOMES = {
         'AirspeedSample',
         'AuxVelocitySample',
         'BaroSample',
+        'DriftSample',
         'FlowSample',
         'GnssSample',
         'HeadingSample',
@@ -72,6 +74,7 @@ __all__ = [
     'AirspeedSample',
     'AuxVelocitySample',
     'BaroSample',
+    'DriftSample',
     'Ekf2',
     'Ekf2Params',
     'Estimator',

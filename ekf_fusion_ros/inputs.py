@@ -50,6 +50,7 @@ from ekf_fusion_ros.samples import AirspeedSample
 from ekf_fusion_ros.samples import ArmedSample
 from ekf_fusion_ros.samples import AuxVelocitySample
 from ekf_fusion_ros.samples import BaroSample
+from ekf_fusion_ros.samples import DriftSample
 from ekf_fusion_ros.samples import FlowSample
 from ekf_fusion_ros.samples import GnssSample
 from ekf_fusion_ros.samples import HeadingSample
@@ -60,6 +61,7 @@ from ekf_fusion_ros.samples import RangeSample
 from ekf_fusion_ros.samples import VisionSample
 
 if TYPE_CHECKING:
+    from ekf_fusion_ros.odometry_drift import OdometryDrift
     from ekf_fusion_ros.params.tree import Params
 
 DECODERS: dict[str, Callable[..., Any]] = {
@@ -101,6 +103,7 @@ ROLE_OF_SAMPLE: dict[type, str] = {
     LandedSample: LANDED,
     ArmedSample: ARMED,
     HeadingSample: 'heading',
+    DriftSample: 'drift',
 }
 
 JUMPS = {
@@ -189,7 +192,17 @@ def make_odometry_imu(params: Params) -> Any:
     return OdometryImu(params.two_topic)
 
 
-def make_motion_heading(params: Params, roles: Collection[str]) -> Any:
+def make_odometry_drift(params: Params) -> OdometryDrift | None:
+    """Return what learns the drift of the odometry, None where nothing would go by it."""
+    if params.estimator != 'ekf2' or not params.two_topic.drift.learn:
+        return None
+    from ekf_fusion_ros.odometry_drift import OdometryDrift
+    return OdometryDrift(params.two_topic.drift)
+
+
+def make_motion_heading(
+    params: Params, roles: Collection[str], drift: OdometryDrift | None,
+) -> Any:
     """Return what finds the heading of the odometry frame from motion, None where not needed."""
     if not (FIX in roles and ODOMETRY in roles):
         return None
@@ -197,4 +210,4 @@ def make_motion_heading(params: Params, roles: Collection[str]) -> Any:
     delay_ms = params.ekf2.gnss.delay_ms - params.ekf2.vision.delay_ms
     if params.estimator == 'lpe':
         delay_ms = 1000.0 * (params.lpe.gnss.delay - params.lpe.vision.delay)
-    return MotionHeading(params.two_topic, round(1000 * delay_ms))
+    return MotionHeading(params.two_topic, round(1000 * delay_ms), drift)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ekf_fusion_ros.geo.projection import Wgs84Projection
 from ekf_fusion_ros.mathlib.angles import wrap_pi
 from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
+from ekf_fusion_ros.odometry_drift import OdometryDrift
 from ekf_fusion_ros.params.two_topic import MotionHeadingParams
 from ekf_fusion_ros.params.two_topic import TwoTopicParams
 from ekf_fusion_ros.samples import GnssSample
@@ -72,8 +73,11 @@ class MotionHeading:
     fixes against odometry stamps.
     """
 
-    def __init__(self, params: TwoTopicParams, fix_delay_us: int = 0) -> None:
-        """Start without a fit."""
+    def __init__(
+        self, params: TwoTopicParams, fix_delay_us: int = 0, drift: OdometryDrift | None = None,
+    ) -> None:
+        """Start without a fit; `drift` is told of the pairs."""
+        self._drift = drift
         self._params: MotionHeadingParams = params.heading
         self._delay_us = fix_delay_us
         self._projection: Wgs84Projection | None = None
@@ -175,6 +179,8 @@ class MotionHeading:
         self._points.clear()
         self._fit = None
         self._contradictions = 0
+        if self._drift is not None:
+            self._drift.forget()
 
     def _take(self, time_us: int, place: complex, sigma: float) -> bool:
         """Pair a fix with the track; True when an interval was completed."""
@@ -185,7 +191,11 @@ class MotionHeading:
         interval_us = round(self._params.interval * SECOND)
         done = bool(self._pairs) and time_us - self._pairs[0][0] >= interval_us
         if done:
-            self._points.append(_mean(self._pairs))
+            point = _mean(self._pairs)
+            self._points.append(point)
+            if self._drift is not None:
+                self._drift.note(point.time_us, point.path, [pair[2] for pair in self._pairs],
+                                 [pair[3] for pair in self._pairs])
             self._pairs.clear()
             self._trim()
             self._fit = self._fitted()

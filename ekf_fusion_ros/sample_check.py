@@ -12,6 +12,7 @@ from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.samples import AirspeedSample
 from ekf_fusion_ros.samples import AuxVelocitySample
 from ekf_fusion_ros.samples import BaroSample
+from ekf_fusion_ros.samples import DriftSample
 from ekf_fusion_ros.samples import FlowSample
 from ekf_fusion_ros.samples import GnssSample
 from ekf_fusion_ros.samples import HeadingSample
@@ -105,6 +106,11 @@ def _heading(sample: HeadingSample) -> None:
     _variances('heading', sample.variance)
 
 
+def _drift(sample: DriftSample) -> None:
+    if not sample.walk >= 0.0:
+        raise Refused('negative_covariance', f'a random walk of {sample.walk:g} m/sqrt(m)')
+
+
 def _finite(name: str, *values: Any) -> None:
     if not all(np.isfinite(value).all() for value in values):
         raise Refused('not_finite', f'a number of a sample of {name} is not finite')
@@ -131,4 +137,5 @@ _CHECKS: dict[type, Callable[[Any], None]] = {
     AirspeedSample: _airspeed,
     AuxVelocitySample: _aux_velocity,
     HeadingSample: _heading,
+    DriftSample: _drift,
 }

@@ -224,7 +224,15 @@ class HeadingSample(NamedTuple):
     variance: float
 
 
+class DriftSample(NamedTuple):
+    """Random walk of the position of the odometry in m/sqrt(m), at most; inf: not known."""
+
+    time_us: int
+    walk: float
+
+
 Sample = (
     ImuSample | GnssSample | MagSample | BaroSample | VisionSample | RangeSample | FlowSample
     | AirspeedSample | AuxVelocitySample | LandedSample | ArmedSample | HeadingSample
+    | DriftSample
 )

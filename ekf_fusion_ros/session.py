@@ -32,6 +32,7 @@ from ekf_fusion_ros.inputs import adopt_params
 from ekf_fusion_ros.inputs import decoder_of
 from ekf_fusion_ros.inputs import make_estimator
 from ekf_fusion_ros.inputs import make_motion_heading
+from ekf_fusion_ros.inputs import make_odometry_drift
 from ekf_fusion_ros.inputs import rows_decoder_of
 from ekf_fusion_ros.inputs import uses_fixes
 from ekf_fusion_ros.map_origin import fixed_origin
@@ -153,7 +154,8 @@ class FusionSession:
         self._intake = FixIntake(
             self._statistics, roles, self.params, self._estimator.nav_state)
         self._inertial = InertialInput(self.params, self._inertial_role) if roles else None
-        self._motion = make_motion_heading(self.params, roles)
+        self._drift = make_odometry_drift(self.params)
+        self._motion = make_motion_heading(self.params, roles, self._drift)
 
     def handle(self, role: str, message: Any) -> list[FusedOutput]:
         """Take one ROS message (of rosbags or rclpy) and return the outputs that are due.
@@ -352,6 +354,9 @@ class FusionSession:
         heading = self._motion.push_fix(fix)
         if heading is not None:
             self._estimator.push(heading)
+        drift = None if self._drift is None else self._drift.news(fix.time_us)
+        if drift is not None:
+            self._estimator.push(drift)
 
     def _run(self, role: str, reading: Any) -> list[FusedOutput]:
         """Step through the increments that end with a message of the inertial role."""

@@ -18,7 +18,7 @@ LAYERS = (
     ('kernels.compile',),
     ('mathlib', 'geo', 'frames'),
     ('params', 'samples', 'buffer', 'estimator', 'observation'),
-    ('kernels',),
+    ('kernels', 'odometry_drift'),
     ('ekf2', 'lpe', 'health', 'odometry_imu', 'motion_heading', 'receivers'),
     ('messages',),
     (

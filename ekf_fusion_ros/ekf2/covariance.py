@@ -67,6 +67,7 @@ class Covariance:
         process['peak_limits'] = imu.accel_bias_learn_gyro_limit, imu.accel_bias_learn_accel_limit
         process['peak_decay'] = 1.0 - FILTER_PERIOD / imu.accel_bias_learn_time
         self._velocity_var: Array = process['velocity_var']
+        self._seen_drift = math.inf
         self.set_noise(params)
 
     def set_noise(self, params: Ekf2Params) -> None:
@@ -82,8 +83,19 @@ class Covariance:
         noise[16:19] = (dt * mag.earth_process_noise) ** 2
         noise[19:22] = (dt * mag.body_process_noise) ** 2
         process['wind_noise'] = dt * params.aiding.wind_process_noise
-        process['position_drift_var'] = dt * params.aiding.position_drift ** 2
+        self._assumed_drift = params.aiding.position_drift
+        self.limit_position_drift(self._seen_drift)
         process['yaw_drift_var'] = dt * params.aiding.yaw_drift ** 2
+
+    @property
+    def position_drift(self) -> float:
+        """Random walk of the horizontal position in m/sqrt(m) that is reckoned with."""
+        return min(self._assumed_drift, self._seen_drift)
+
+    def limit_position_drift(self, seen: float) -> None:
+        """Take the random walk in m/sqrt(m) for no more than was seen, from now on."""
+        self._seen_drift = seen
+        self._process[0]['position_drift_var'] = FILTER_PERIOD * self.position_drift ** 2
 
     def predict(
         self, x: Array, rot: Array, imu: DelayedImu, earth_rate: Array, dt_avg: float,

@@ -35,6 +35,7 @@ from ekf_fusion_ros.samples import NO_CLIPPING
 from ekf_fusion_ros.samples import AirspeedSample
 from ekf_fusion_ros.samples import AuxVelocitySample
 from ekf_fusion_ros.samples import BaroSample
+from ekf_fusion_ros.samples import DriftSample
 from ekf_fusion_ros.samples import FlowSample
 from ekf_fusion_ros.samples import GnssSample
 from ekf_fusion_ros.samples import HeadingSample
@@ -93,6 +94,7 @@ class Ekf2:
             AirspeedSample: control.airspeed.push,
             AuxVelocitySample: control.aux_velocity.push,
             HeadingSample: lambda sample, _: control.vision.heading.push(sample),
+            DriftSample: lambda sample, _: self.filter.cov.limit_position_drift(sample.walk),
             LandedSample: lambda sample, _: self._ground_contact.tell(sample),
         }
 

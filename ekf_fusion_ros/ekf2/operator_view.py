@@ -66,6 +66,7 @@ def _uncertainty(ekf: Ekf2) -> dict[str, str]:
         'height_sigma': f'{_sigma(p[9, 9]):.3f}',
         'velocity_sigma': f'{_sigma(np.trace(p[4:7, 4:7])):.3f}',
         'attitude_sigma_deg': f'{math.degrees(_sigma(np.trace(rotation))):.2f}',
+        'position_drift': f'{ekf.filter.cov.position_drift:.3f}',
     }
 
 

@@ -72,8 +72,26 @@ class MotionHeadingParams:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DriftParams:
+    """Drift of the odometry, measured against fixes."""
+
+    learn: bool = param(
+        True, 'Take the odometry to drift no more than it was seen to, where that is less than '
+        '`ekf2.aiding.position_drift`.')
+    path: float = param(
+        50.0, 'Path over which odometry and fixes are compared.', unit='m', min=5, max=10000)
+    factor: float = param(
+        3.0, 'Drift that is assumed, against the one that was seen: scale and heading err for '
+        'longer than a random walk.', min=1, max=100)
+    hold: float = param(
+        15.0, 'Age from which a fix counts: one that is wrong for a shorter time does not make '
+        'the odometry look worse while it lasts.', unit='s', min=0, max=600)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TwoTopicParams:
-    """Odometry and fixes alone."""
+    """What odometry and fixes tell about each other."""
 
     odometry: OdometryImuParams = field(default_factory=OdometryImuParams)
     heading: MotionHeadingParams = field(default_factory=MotionHeadingParams)
+    drift: DriftParams = field(default_factory=DriftParams)

@@ -19,14 +19,14 @@ WRONG_FROM = 90.0
 EARTH_RADIUS = 6.371e6
 
 
-def tracks(rate, seed, wrong_for, wrong_by):
+def tracks(rate, seed, wrong_for, wrong_by, roles=('odometry', 'fix')):
     """Return the time (N,) in s, and the position NE (N, 2) without and with wrong fixes."""
-    sensors = default_sensors(('odometry', 'fix'))
+    sensors = default_sensors(roles)
     sensors['fix'] = replace(sensors['fix'], rate=rate)
     flight = Scenario(trajectory=Flight(duration=SECONDS, height=15.0), sensors=sensors, seed=seed)
     both = []
     for shift in (0.0, wrong_by):
-        session, rows = FusionSession(Params(), ['odometry', 'fix']), []
+        session, rows = FusionSession(Params(), roles), []
         for arrival in flight.arrivals():
             sample, seconds = arrival.sample, 1e-6 * (arrival.time_us - flight.start_us)
             if arrival.role == 'fix' and WRONG_FROM <= seconds < WRONG_FROM + wrong_for:
@@ -43,3 +43,11 @@ def test_a_fix_that_is_off_for_less_than_a_second_is_refused(rate, seed):
     time, without, with_wrong = tracks(rate, seed, wrong_for=0.9, wrong_by=25.0)
     moved = np.abs(with_wrong - without).max(axis=1)
     assert moved[time > WRONG_FROM].max() < 1.0
+
+
+@pytest.mark.parametrize('roles', [
+    ('odometry', 'fix'), ('odometry', 'fix', 'imu', 'magnetic_field', 'pressure')])
+def test_odometry_that_was_seen_to_be_good_outlasts_ten_seconds_of_wrong_fixes(roles):
+    time, without, with_wrong = tracks(5.0, 1, wrong_for=10.0, wrong_by=15.0, roles=roles)
+    moved = np.abs(with_wrong - without).max(axis=1)
+    assert moved[time > WRONG_FROM].max() < 3.0
