@@ -183,6 +183,10 @@ class Resets:
             f.events.add(f.t_now, EventKind.VEL_RESET_ZERO)
             self.horizontal_velocity(np.zeros(2), np.full(2, UNKNOWN_VELOCITY_VARIANCE))
 
+    def velocity_to_unknown(self) -> None:
+        """Forget what the assumption of rest has taught of the horizontal velocity."""
+        self._f.cov.set_variances(VN, np.full(2, UNKNOWN_VELOCITY_VARIANCE))
+
     def velocity_to_fix(self) -> None:
         """Take the velocity of the delayed fix, all three axes."""
         f = self._f

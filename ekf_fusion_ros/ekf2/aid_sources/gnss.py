@@ -235,6 +235,8 @@ class Gnss:
             self._resets.position_to_fix()
         if not f.flags.opt_flow and f.fix.has_velocity:
             self._resets.velocity_to_fix()
+        elif not f.flags.aided_horizontally():
+            self._resets.velocity_to_unknown()
         f.flags.gps = True
         if not self._flies_on_wings():
             # otherwise what follows a time-out is wanted too: a check of yaw by the course
