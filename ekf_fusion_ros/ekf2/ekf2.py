@@ -21,6 +21,7 @@ from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.ground_contact import GroundContact
 from ekf_fusion_ros.ekf2.inertial_input import InertialInput
 from ekf_fusion_ros.ekf2.inertial_input import buffer_lengths
+from ekf_fusion_ros.ekf2.inertial_lapse import InertialLapse
 from ekf_fusion_ros.ekf2.report import health
 from ekf_fusion_ros.ekf2.report import nav_state
 from ekf_fusion_ros.estimator import AidStatus
@@ -74,6 +75,7 @@ class Ekf2:
         self._alignment = Alignment(self.filter, self.control.mag, self.control.baro,
                                     self.control.height_source, self._observation_length)
         self._accel_bias_check = AccelBiasCheck(self.filter)
+        self._lapse = InertialLapse(self.filter, self.control.resets, self.control.bank)
         self._ground_contact = GroundContact(self.filter)
         self._raw: ImuSample | None = None
         self._nav: NavState | None = None
@@ -171,6 +173,7 @@ class Ekf2:
         f.faults.accel_clipping = f.imu.clipping != NO_CLIPPING
         if learned:
             self._accel_bias_check.step(down_bias)
+        self._lapse.step()
 
     def _push_fix(self, sample: GnssSample, min_interval_us: int) -> None:
         altitude_before = self.filter.earth.alt_ref

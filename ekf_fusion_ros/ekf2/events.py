@@ -35,6 +35,7 @@ class EventKind(Enum):
     VISION_YAW_STARTED = 'started odometry yaw fusion'
     YAW_ALIGNED_IMU_GPS = 'yaw aligned from inertial data and GNSS velocity'
     YAW_ALIGNED_MOTION = 'yaw aligned by matching odometry and GNSS displacements'
+    INERTIAL_LAPSE = 'inertial data missing, attitude and motion doubted'
     POSE_SET = 'pose set on request'
     TILT_ALIGNED = 'tilt aligned'
     YAW_ALIGNED = 'yaw aligned'

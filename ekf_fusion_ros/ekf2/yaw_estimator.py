@@ -50,6 +50,12 @@ class YawEstimator:
         self._velocity: Array | None = None
         self._accuracy = 0.0
 
+    def restart(self) -> None:
+        """Find tilt and yaw anew."""
+        self._tilt_aligned = False
+        self.models['tilt_aligned'] = False
+        self._run(False)
+
     def set_velocity(self, velocity: Array, accuracy: float) -> None:
         """Offer a NE velocity (2,) and its 1-sigma accuracy, m/s, to the next step."""
         self._velocity = velocity[0:2].copy()
