@@ -141,6 +141,7 @@ class FusionSession:
         self._now_us: int | None = None
         self._tick: int | None = None
         self._fixes: list[GnssSample] = []
+        self._velocity_seen = False
         self._inertial_order = InertialOrder(
             round(SECOND_US * session.stamp_gap_max), round(SECOND_US * session.gap_notice))
         lead_us = round(SECOND_US * session.stamp_lead_max)
@@ -344,6 +345,7 @@ class FusionSession:
 
     def _push_fix(self, fix: GnssSample) -> None:
         self._fixes.append(fix)
+        self._velocity_seen |= fix.has_velocity
         self._navigation.note(fix)
         self._estimator.push(fix)
         if self._motion is None:
@@ -586,18 +588,27 @@ class FusionSession:
         if role:
             return f'waiting for {role}: {self._statistics[role].summary()}'
         nav = self._estimator.nav_state()
-        if self._motion is None or (nav is not None and nav.yaw_aligned):
+        if nav is not None and nav.yaw_aligned:
             return ''
-        return self._missing_for_yaw() or self._motion.status().text
+        missing = self._missing_for_yaw()
+        if missing or self._motion is None:
+            return missing
+        return str(self._motion.status().text)
 
     def _missing_for_yaw(self) -> str:
         """Say what to add where no topic in use ties the yaw of an IMU to anything."""
         roles = self.roles or frozenset()
-        if IMU not in roles or not self._heading.known or self._heading.has_attitude \
-                or roles & YAW_WITHOUT_ODOMETRY:
+        if IMU not in roles or self._local or self._velocity_seen or roles & YAW_WITHOUT_ODOMETRY:
             return ''
-        return ('the yaw cannot be aligned: the odometry has no orientation; add a topic of '
-                f'{", ".join(sorted(YAW_WITHOUT_ODOMETRY))}, or leave the imu out')
+        add = f'add a topic of {", ".join(sorted(YAW_WITHOUT_ODOMETRY))}'
+        if ODOMETRY not in roles:
+            no_attitude = self._estimator.nav_state() is None
+            return '' if no_attitude else (
+                f'the yaw cannot be aligned: the fixes have no velocity; {add} or odometry')
+        if not self._heading.known or self._heading.has_attitude:
+            return ''
+        return ('the yaw cannot be aligned: the odometry has no orientation; '
+                f'{add}, or leave the imu out')
 
     def _collect(self) -> None:
         self._events += self._estimator.drain_events()

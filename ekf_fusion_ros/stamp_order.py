@@ -10,6 +10,10 @@ from ekf_fusion_ros.messages.refusal import Refused
 PAUSE_US = 1_000_000
 USUAL_STEPS = 4
 
+# No message is late by so much: such stamps are those of another clock.
+OTHER_CLOCK_US = 10_000_000
+OTHER_CLOCK = 'they are of different clocks, stamp both by the same one'
+
 
 class Step(Enum):
     """How an inertial stamp follows the one before."""
@@ -95,8 +99,15 @@ class AidingOrder:
 
     def _against_inertial(self, time_us: int, now_us: int) -> None:
         lead = time_us - now_us
+        other_clock = abs(lead) > OTHER_CLOCK_US
         if lead > self._lead_us:
-            raise Refused('stamp_ahead', f'stamp {lead / 1e6:.3f} s ahead of the inertial input')
+            advice = OTHER_CLOCK if other_clock else (
+                f'session.stamp_lead_max allows {self._lead_us / 1e6:g} s')
+            raise Refused(
+                'stamp_ahead', f'stamp {lead / 1e6:.3f} s ahead of the inertial input: {advice}')
         if lead < -self._age_us:
-            raise Refused('too_old', f'stamp {-lead / 1e6:.3f} s behind the inertial input: raise '
-                          'session.horizon_ms where messages come that late')
+            advice = OTHER_CLOCK if other_clock else (
+                f'at most {self._age_us / 1e6:.3f} s can be used; where messages come that late '
+                'raise session.horizon_ms, and session.stamp_age_max if that is less')
+            raise Refused(
+                'too_old', f'stamp {-lead / 1e6:.3f} s behind the inertial input: {advice}')

@@ -115,6 +115,7 @@ def _replay_bag(options: ReplayOptions, progress: Progress, say: Say) -> dict[st
         progress.start_us = recording.start_ns // 1000
         progress.end_us = recording.end_ns // 1000
         _check_start(options, progress)
+        _check_withheld(options, choice)
         run = _Run(replace(options, params=params), list(choice.topics), progress)
         run.drive(_bag_steps(run, recording, choice))
         progress.notes = recording.notes
@@ -215,6 +216,13 @@ def _check_start(options: ReplayOptions, progress: Progress) -> None:
     if options.start > duration:
         raise ValueError(f'--start {options.start:g}: {options.recording} ends {duration:.1f} s '
                          'after its start')
+
+
+def _check_withheld(options: ReplayOptions, choice: Choice) -> None:
+    for role in options.withhold:
+        if role not in choice.topics:
+            raise ValueError(f'--withhold {role}: no topic of {options.recording} has this role; '
+                             f'in use are {", ".join(choice.topics)}')
 
 
 def _make_folder(options: ReplayOptions) -> None:

@@ -109,7 +109,9 @@ def _topics(session: FusionSession, choice: Choice) -> dict[str, Any]:
         chosen = choice.topics.get(role)
         name = role if chosen is None else chosen.name
         about = {'role': role} | ({} if chosen is None else {'type': chosen.type})
-        topics[name] = about | statistics.as_dict()
+        topics[name] = about | statistics.as_dict() | {
+            'first_refusals': {reason: detail for reason, detail in statistics.details.items()
+                               if detail}}
     return topics
 
 
@@ -174,6 +176,8 @@ def _gist(summary: dict[str, Any]) -> list[str]:
         lines.append(f'{name}: {topic["received"]} received, {topic["accepted"]} accepted'
                      + (f', refused: {reasons}' if reasons else '')
                      + (f', passed over: {passed_over}' if passed_over else ''))
+        lines += [f'{name}: {reason}, the first: {detail}'
+                  for reason, detail in topic['first_refusals'].items()]
     for name, aid in summary['aid_sources'].items():
         if aid['fused'] or aid['rejected']:
             lines.append(f'{name}: {aid["fused"]} fused, {aid["rejected"]} rejected')
@@ -193,5 +197,5 @@ def _missing(summary: dict[str, Any]) -> str:
     if summary['frame'] == 'local':
         return 'the filter never started'
     if summary['origin'] is None:
-        return 'the origin was never set'
+        return f'the origin was never set ({summary["health"]})'
     return f'the yaw was never aligned ({summary["health"]})'

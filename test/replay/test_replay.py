@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 import gzip
 import json
 import math
@@ -227,6 +228,20 @@ def test_role_kept_out_and_role_added(flight, tmp_path, capsys):
     assert 'left out as asked: /mag' in capsys.readouterr().out
 
 
+def test_what_was_refused_is_said_in_a_sentence(tmp_path, capsys):
+    """Fixes that are recorded 0.6 s after their stamp come too late for the filter."""
+    sensors = default_sensors(AUTOPILOT)
+    sensors['fix'] = replace(sensors['fix'], latency=0.6, has_velocity=False)
+    scenario = Scenario(trajectory=FigureOfEight(duration=8.0), sensors=sensors, seed=3)
+    write_recording(tmp_path / 'late', scenario.arrivals())
+    assert run(tmp_path / 'late', tmp_path / 'out') == 0
+    said = capsys.readouterr().out
+    assert '/fix: too_old, the first: stamp 0.59' in said
+    assert 'no output: the origin was never set (waiting for fix: ' in said
+    assert 'session.horizon_ms' in summary(tmp_path / 'out')[
+        'topics']['/fix']['first_refusals']['too_old']
+
+
 def test_parameters_in_order_of_files_then_set(flight, tmp_path):
     first, second = tmp_path / 'first.yaml', tmp_path / 'second.yaml'
     for path, rate in ((first, 5), (second, 10)):
@@ -248,6 +263,7 @@ def test_parameters_in_order_of_files_then_set(flight, tmp_path):
     (['--topic', 'fix'], 'role=/name'),
     (['--withhold', 'fix=20'], 'window'),
     (['--withhold', 'fix=20:10'], 'ends before'),
+    (['--withhold', 'odometry=5:10'], 'no topic of'),
     (['--start', '-1'], 'seconds from 0'),
     (['--start', '5', '--end', '4'], 'not after'),
     (['--start', '500'], 'ends 30'),

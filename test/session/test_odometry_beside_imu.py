@@ -73,3 +73,15 @@ def test_a_yaw_that_nothing_tells_is_named(roles, told):
     assert ('the odometry has no orientation; add a topic of fix_velocity'
             in session.health().text) == told
     assert session.estimator.nav_state().yaw_aligned != told
+
+
+@pytest.mark.parametrize(('velocity', 'told'), [(False, True), (True, False)])
+def test_a_yaw_that_fixes_without_velocity_cannot_tell_is_named(velocity, told):
+    sensors = default_sensors(('imu', 'fix'))
+    sensors['fix'] = replace(sensors['fix'], has_velocity=velocity)
+    flight = Scenario(trajectory=Flight(duration=20.0, height=15.0), sensors=sensors, seed=1)
+    session = FusionSession(Params(), ['imu', 'fix'])
+    for arrival in flight.arrivals():
+        session.push(arrival.sample)
+    assert ('the fixes have no velocity; add a topic of fix_velocity'
+            in session.health().text) == told

@@ -89,6 +89,29 @@ def test_aiding_far_from_inertial_time_is_refused(build, estimator):
     assert session.statistics()['pressure'].accepted == 1
 
 
+def test_what_a_refused_stamp_advises_helps(build, estimator):
+    """A fix that comes a second late is taken once both parameters of the sentence are raised."""
+    def first_refusal(**overrides):
+        session = session_of(estimator, 'imu', 'fix', **overrides)
+        run_imu(session, build, START, START + 2)
+        session.handle('fix', build.fix(START + 1))
+        return session.statistics()['fix'].details.get('too_old', '')
+
+    told = first_refusal()
+    assert 'session.horizon_ms' in told
+    assert 'session.stamp_age_max' in told
+    assert first_refusal(session__horizon_ms=1500.0)
+    assert not first_refusal(session__horizon_ms=1500.0, session__stamp_age_max=1.5)
+
+
+@pytest.mark.parametrize(('shift', 'reason'), [(-3600.0, 'too_old'), (1e6, 'stamp_ahead')])
+def test_stamps_of_another_clock_are_named_so(build, estimator, shift, reason):
+    session = session_of(estimator, 'imu', 'fix')
+    run_imu(session, build, 2 * START + 3000, 2 * START + 3001)
+    session.handle('fix', build.fix(2 * START + 3001 + shift))
+    assert 'different clocks' in session.statistics()['fix'].details[reason]
+
+
 def test_wild_first_stamp_does_not_block_a_role(build, estimator):
     session = session_of(estimator, 'imu', 'fix')
     session.handle('fix', build.fix(START + 5e8))
