@@ -26,6 +26,18 @@ class OdometryHeading:
         """True where the newest odometry sample tells how the body lies in its frame."""
         return self._newest is not None and self._newest.has_attitude
 
+    @property
+    def lack(self) -> str:
+        """Sentence on what odometry alone leaves open, '' where it has an orientation."""
+        newest = self._newest
+        if newest is None or newest.has_attitude:
+            return ''
+        if newest.has_position:
+            return ('the odometry has no orientation: roll, pitch and yaw of the output are those '
+                    'of its frame, not of the vehicle')
+        return ('the odometry has neither position nor orientation: its twist alone tells no '
+                'direction; let pose.covariance say that the orientation is measured')
+
     def push(self, sample: VisionSample) -> None:
         """Note an odometry sample."""
         self._newest = sample

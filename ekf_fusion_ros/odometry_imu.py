@@ -65,6 +65,7 @@ class OdometryImu:
         """Return the increments (0 to many) that end with this message, the last at its stamp."""
         last = self._last
         self.jump = ''
+        sample = _with_direction(sample)
         attitude = sample.quaternion if math.isfinite(sample.quaternion[0]) else LEVEL
         if last is None:
             position = sample.position.copy()
@@ -192,6 +193,15 @@ class OdometryImu:
         return sample._replace(
             quaternion=attitude, velocity=velocity, velocity_cov=covariance,
             velocity_frame=VelocityFrame.BODY_FRD)
+
+
+def _with_direction(sample: VisionSample) -> VisionSample:
+    """Return a sample without a velocity whose direction in the odometry frame is not known.
+
+    Positions tell it there, where a body velocity without an attitude does not.
+    """
+    blind = sample.velocity_frame is VelocityFrame.BODY_FRD and not sample.has_attitude
+    return sample._replace(velocity=NAN3) if blind and sample.has_position else sample
 
 
 def _body_velocity(sample: VisionSample, attitude: Array) -> Array:

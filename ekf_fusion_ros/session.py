@@ -70,6 +70,7 @@ from ekf_fusion_ros.stamp_order import Step
 from ekf_fusion_ros.stamp_order import check_advance
 from ekf_fusion_ros.statistics import RoleStatistics
 from ekf_fusion_ros.statistics import note_milestones
+from ekf_fusion_ros.twist_check import TwistCheck
 
 if TYPE_CHECKING:
     from ekf_fusion_ros.params.tree import Params
@@ -150,6 +151,7 @@ class FusionSession:
         self._rates = SensorRates(minimum_rates(self.params.ekf2, frozenset(roles)))
         self._heading = OdometryHeading()
         self._down = DownCheck(both=IMU in roles and ODOMETRY in roles)
+        self._twist = TwistCheck()
         self._holding = Holding(round(1000 * session.hold_ms))
         self._completion = Completion(self.params.messages)
         self._intake = FixIntake(
@@ -334,6 +336,8 @@ class FusionSession:
         jump = '' if self._inertial is None else self._inertial.jump()
         if jump:
             self._tell(sample.time_us, jump)
+        if self._twist.open and self._twist.note(sample, jumped=bool(jump)):
+            self._tell(sample.time_us, self._twist.sentence)
         if self._motion is not None:
             self._motion.push_odometry(sample, jumped=bool(jump))
         self._estimator.push(sample if self._inertial is None else self._inertial.fused(sample))
@@ -561,7 +565,9 @@ class FusionSession:
 
     def warnings(self) -> list[str]:
         """Return what is wrong with the inputs, in sentences."""
-        return [*self._rates.slow(), *filter(None, [self._down.sentence])]
+        lack = self._heading.lack if self._inertial_role == ODOMETRY else ''
+        said = (self._down.sentence, self._twist.sentence, lack)
+        return [*self._rates.slow(), *filter(None, said)]
 
     def receivers(self) -> Sequence[ReceiverStatus]:
         """Return what becomes of each of several receivers, nothing where there is one."""

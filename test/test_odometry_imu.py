@@ -154,3 +154,10 @@ def test_a_session_tells_when_the_odometry_frame_jumps():
     told = [event.text for event in session.drain_events() if 'jumped' in event.text]
     assert len(told) == 1
     assert 'position of the odometry' in told[0]
+
+
+def test_without_an_attitude_the_positions_tell_the_direction(source):
+    """The body goes 2 m/s ahead and turns: down the y axis of the frame, which it does not say."""
+    for k in range(100):
+        source.push(odometry(50_000 * k, (0.0, 0.1 * k, 0.0), NAN4, (2.0, 0.0, 0.0)))
+    assert source.fused().velocity == pytest.approx((0.0, 2.0, 0.0), abs=1e-6)
