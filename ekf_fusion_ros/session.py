@@ -245,7 +245,8 @@ class FusionSession:
             self._fixes.append(sample)
         if isinstance(sample, (GnssSample, LandedSample, ArmedSample)):
             self._navigation.note(sample)
-        self._estimator.push(sample)
+        if not isinstance(sample, ArmedSample):
+            self._estimator.push(sample)
         return []
 
     def _judge_role(self, role: str) -> None:

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from ekf_fusion_ros.buffer import SampleBuffer
 from ekf_fusion_ros.ekf2.accel_bias_check import AccelBiasCheck
+from ekf_fusion_ros.ekf2.admission import admitted
+from ekf_fusion_ros.ekf2.admission import admitted_imu
 from ekf_fusion_ros.ekf2.alignment import Alignment
 from ekf_fusion_ros.ekf2.control import Control
 from ekf_fusion_ros.ekf2.filter import Filter
@@ -101,14 +103,23 @@ class Ekf2:
         }
 
     def push(self, sample: Sample) -> None:
-        """Queue a measurement; those before the first ImuSample have no effect."""
+        """Queue a measurement; those before the first ImuSample have no effect.
+
+        Raises ValueError for a sample with an array of wrong shape, or with numbers that are not
+        finite where they must be, and TypeError for what is no sample; the state stays as it is.
+        """
         self._nav = None
         if isinstance(sample, ImuSample):
+            sample = admitted_imu(sample)
             if self._raw is not None:
                 self.update()
             self._raw = sample
             self.inertial.started = True
+        elif type(sample) not in self._queues:
+            raise TypeError(f'{type(sample).__name__}: expected one of '
+                            + ', '.join(kind.__name__ for kind in (ImuSample, *self._queues)))
         elif self.inertial.started:
+            sample = admitted(sample)
             self._queues[type(sample)](sample, self.inertial.min_interval_us)
         else:
             self._too_early[type(sample)] += 1

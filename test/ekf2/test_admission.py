@@ -1,0 +1,82 @@
+"""What a user may push: any array of numbers; what cannot be a measurement is named."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from ekf_fusion_ros.ekf2.ekf2 import Ekf2
+from ekf_fusion_ros.params import Params
+from ekf_fusion_ros.samples import ArmedSample
+from ekf_fusion_ros.samples import BaroSample
+from ekf_fusion_ros.samples import FlowSample
+from ekf_fusion_ros.samples import GnssSample
+from ekf_fusion_ros.samples import ImuSample
+from ekf_fusion_ros.samples import MagSample
+from ekf_fusion_ros.samples import VisionSample
+from ekf_fusion_ros.session import FusionSession
+
+DT = 0.01
+REST = (0.0, 0.0, -9.80665 * DT)
+NAN = math.nan
+
+
+def stand(ekf, build=np.array, seconds=3.0, begin_us=1_000_000):
+    """Let a filter stand still, facing north; return the time after."""
+    for k in range(round(seconds / DT)):
+        time_us = begin_us + round(1e6 * DT * k)
+        ekf.push(ImuSample(time_us, build((0.0, 0.0, 0.0)), build(REST), DT, DT))
+        ekf.push(MagSample(time_us, build((0.2, 0.0, 0.4))))
+        ekf.push(BaroSample(time_us, 100.0))
+        ekf.update()
+    return begin_us + round(1e6 * seconds)
+
+
+@pytest.mark.parametrize('build', [
+    list, tuple, lambda v: np.array(v, np.float32), lambda v: np.repeat(v, 2)[::2],
+    lambda v: np.array(v, '>f8')])
+def test_numbers_may_come_in_any_array(build):
+    ekf = Ekf2()
+    stand(ekf, build)
+    state = ekf.nav_state()
+    np.testing.assert_allclose(state.position, 0.0, atol=1e-3)
+    # cos and sin of half a yaw of zero: the field points north
+    np.testing.assert_allclose(state.quaternion, (1.0, 0.0, 0.0, 0.0), atol=1e-3)
+
+
+@pytest.mark.parametrize(('sample', 'words'), [
+    (lambda t: ImuSample(t, np.zeros(2), np.array(REST), DT, DT), 'ImuSample.delta_angle has'),
+    (lambda t: ImuSample(t, np.zeros((3, 1)), np.array(REST), DT, DT), r'shape \(3, 1\)'),
+    (lambda t: ImuSample(t, np.zeros(3), np.full(3, NAN), DT, DT), 'delta_velocity is'),
+    (lambda t: ImuSample(t, np.array((math.inf, 0, 0)), np.zeros(3), DT, DT), 'delta_angle is'),
+    (lambda t: ImuSample(t, np.zeros(3), np.array(REST), NAN, DT), 'delta_angle_dt is nan'),
+    (lambda t: MagSample(t, np.array((0.2, NAN, 0.4))), 'MagSample.field is'),
+    (lambda t: MagSample(t, 'north'), 'MagSample.field is'),
+    (lambda t: BaroSample(t, NAN), 'BaroSample.altitude is nan'),
+    (lambda t: GnssSample(t, NAN, 8.0, 400.0, 1.0, 1.5), 'GnssSample.lat is nan'),
+    (lambda t: VisionSample(t, np.zeros(3), np.zeros(3)), 'VisionSample.quaternion has'),
+    (lambda t: FlowSample(t, np.zeros(3), np.zeros(3), 255, 0.1), 'FlowSample.flow has'),
+])
+def test_what_is_no_measurement_is_named_and_changes_nothing(sample, words):
+    ekf, untouched = Ekf2(), Ekf2()
+    now_us = stand(ekf)
+    stand(untouched)
+    with pytest.raises(ValueError, match=words):
+        ekf.push(sample(now_us))
+    stand(ekf, seconds=1.0, begin_us=now_us)
+    stand(untouched, seconds=1.0, begin_us=now_us)
+    np.testing.assert_array_equal(ekf.states(), untouched.states())
+
+
+def test_what_is_no_sample_is_told_from_samples():
+    with pytest.raises(TypeError, match='str: expected one of ImuSample, '):
+        Ekf2().push('north')
+
+
+def test_armed_is_nothing_to_the_filter_of_a_session_without_roles():
+    session = FusionSession(Params())
+    session.push(ImuSample(1_000_000, np.zeros(3), np.array(REST), DT, DT))
+    session.push(ArmedSample(1_000_000, armed=True))
+    assert session.statistics()['armed'].accepted == 1
