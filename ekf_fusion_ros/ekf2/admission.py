@@ -17,22 +17,31 @@ from ekf_fusion_ros.samples import ImuSample
 from ekf_fusion_ros.samples import MagSample
 from ekf_fusion_ros.samples import VisionSample
 
+Shape = tuple[int, ...]
 THREE = (3,)
 CONTIGUOUS = (8,)
+THREE_FLOATS = 24
+"""Strides and size in bytes of three numbers in a row."""
+
 FLOAT = np.dtype(np.float64)
 """The one object of native float64; another that equals it costs a copy, no more."""
 
-# Field, shape, and whether NaN there means that nothing was measured.
-ARRAYS: dict[type, tuple[tuple[str, tuple[int, ...], bool], ...]] = {
-    ImuSample: (('delta_angle', THREE, False), ('delta_velocity', THREE, False)),
-    MagSample: (('field', THREE, False),),
-    GnssSample: (('velocity', THREE, True),),
-    VisionSample: (
-        ('position', THREE, True), ('quaternion', (4,), True), ('velocity', THREE, True),
-        ('position_var', THREE, True), ('velocity_cov', (3, 3), True)),
-    FlowSample: (('flow', (2,), False), ('gyro', THREE, True)),
-    AuxVelocitySample: (('velocity', THREE, False), ('variance', THREE, False)),
+MEASURED: dict[type, dict[str, Shape]] = {
+    ImuSample: {'delta_angle': THREE, 'delta_velocity': THREE},
+    MagSample: {'field': THREE},
+    FlowSample: {'flow': (2,)},
+    AuxVelocitySample: {'velocity': THREE, 'variance': THREE},
 }
+"""Arrays that must be finite."""
+
+PERHAPS_MEASURED: dict[type, dict[str, Shape]] = {
+    GnssSample: {'velocity': THREE},
+    VisionSample: {'position': THREE, 'quaternion': (4,), 'velocity': THREE,
+                   'position_var': THREE, 'velocity_cov': (3, 3)},
+    FlowSample: {'gyro': THREE},
+}
+"""Arrays whose NaN means that nothing was measured."""
+
 NUMBERS: dict[type, tuple[str, ...]] = {
     ImuSample: ('delta_angle_dt', 'delta_velocity_dt'),
     GnssSample: ('lat', 'lon'),
@@ -42,20 +51,30 @@ NUMBERS: dict[type, tuple[str, ...]] = {
 }
 
 
+def _places(fields: dict[type, dict[str, Shape]]) -> dict[type, tuple[tuple[int, Shape], ...]]:
+    return {kind: tuple((kind._fields.index(name), shape) for name, shape in shapes.items())
+            for kind, shapes in fields.items() if hasattr(kind, '_fields')}
+
+
+_MEASURED, _PERHAPS = _places(MEASURED), _places(PERHAPS_MEASURED)
+_NUMBERS = {kind: tuple(kind._fields.index(name) for name in names)
+            for kind, names in NUMBERS.items() if hasattr(kind, '_fields')}
+
+
 def admitted_imu(sample: ImuSample) -> ImuSample:
-    """Return what `admitted` does, at once where there is nothing to do."""
-    _, angle, velocity, angle_dt, velocity_dt, _, _ = sample
+    """Return what `admitted` does, at once where there is nothing to change.
+
+    Whether its numbers are finite is left to the kernel that takes them (InertialInput.add).
+    """
+    _, angle, velocity, _, _, _, _ = sample
     # Of every raw sample, so without a call: see _is_plain.
-    plain = (type(angle) is type(velocity) is np.ndarray
-             and angle.dtype is FLOAT and velocity.dtype is FLOAT
-             and angle.shape == velocity.shape == THREE
-             and angle.strides == velocity.strides == CONTIGUOUS)
-    # A sum is finite only where all of its terms are.
-    if plain and math.isfinite(
-            sum(angle.tolist()) + sum(velocity.tolist()) + angle_dt + velocity_dt):
+    if (type(angle) is type(velocity) is np.ndarray
+            and angle.dtype is FLOAT and velocity.dtype is FLOAT
+            and angle.nbytes == velocity.nbytes == THREE_FLOATS
+            and angle.strides == velocity.strides == CONTIGUOUS):
         return sample
-    checked: ImuSample = admitted(sample)
-    return checked
+    changed: ImuSample = _changed(sample)
+    return changed
 
 
 def admitted(sample: Any) -> Any:
@@ -65,24 +84,51 @@ def admitted(sample: Any) -> Any:
     finite where they must be.
     """
     kind = type(sample)
-    changes = {}
-    for name, shape, may_lack in ARRAYS.get(kind, ()):
-        value = getattr(sample, name)
-        if not _is_plain(value, shape):
-            value = changes[name] = _as_array(value, shape, f'{kind.__name__}.{name}')
-        if not may_lack:
-            _check_finite(value, f'{kind.__name__}.{name}')
-    for name in NUMBERS.get(kind, ()):
-        _check_finite(getattr(sample, name), f'{kind.__name__}.{name}')
-    return sample._replace(**changes) if changes else sample
+    for place, shape in _MEASURED.get(kind, ()):
+        value = sample[place]
+        # A sum is finite only where all of its terms are.
+        if not (_is_plain(value, shape) and math.isfinite(sum(value.tolist()))):
+            return _changed(sample)
+    for place, shape in _PERHAPS.get(kind, ()):
+        if not _is_plain(sample[place], shape):
+            return _changed(sample)
+    for place in _NUMBERS.get(kind, ()):
+        if not math.isfinite(sample[place]):
+            return _changed(sample)
+    return sample
 
 
-def _is_plain(value: Any, shape: tuple[int, ...]) -> bool:
+def _is_plain(value: Any, shape: Shape) -> bool:
     return (type(value) is np.ndarray and value.shape == shape and value.dtype is FLOAT
             and value.flags.c_contiguous)
 
 
-def _as_array(value: Any, shape: tuple[int, ...], name: str) -> Any:
+def _changed(sample: Any) -> Any:
+    """Return a sample with arrays as the filter takes them, or raise ValueError."""
+    kind = type(sample)
+    must, may = MEASURED.get(kind, {}), PERHAPS_MEASURED.get(kind, {})
+    changes = {name: _as_array(getattr(sample, name), shape, f'{kind.__name__}.{name}')
+               for name, shape in {**must, **may}.items()}
+    changed = sample._replace(**changes)
+    for name in _finite_fields(kind):
+        if not np.isfinite(getattr(changed, name)).all():
+            raise not_finite(changed)
+    return changed
+
+
+def not_finite(sample: Any) -> ValueError:
+    """Return the error that names the fields of a sample that are not finite, but must be."""
+    kind = type(sample)
+    wrong = [f'{kind.__name__}.{name} is {getattr(sample, name)}' for name in _finite_fields(kind)
+             if not np.isfinite(getattr(sample, name)).all()]
+    return ValueError(f'{", ".join(wrong)}: must be finite')
+
+
+def _finite_fields(kind: type) -> tuple[str, ...]:
+    return *MEASURED.get(kind, {}), *NUMBERS.get(kind, ())
+
+
+def _as_array(value: Any, shape: Shape, name: str) -> Any:
     try:
         array = np.ascontiguousarray(value, np.float64)
     except (TypeError, ValueError):
@@ -90,8 +136,3 @@ def _as_array(value: Any, shape: tuple[int, ...], name: str) -> Any:
     if array.shape != shape:
         raise ValueError(f'{name} has shape {array.shape}: expected {shape}')
     return array
-
-
-def _check_finite(value: Any, name: str) -> None:
-    if not np.isfinite(value).all():
-        raise ValueError(f'{name} is {value}: must be finite')

@@ -106,7 +106,8 @@ class Ekf2:
         """Queue a measurement; those before the first ImuSample have no effect.
 
         Raises ValueError for a sample with an array of wrong shape, or with numbers that are not
-        finite where they must be, and TypeError for what is no sample; the state stays as it is.
+        finite where they must be (an ImuSample at its update), and TypeError for what is no
+        sample; the state stays as it is.
         """
         self._nav = None
         if isinstance(sample, ImuSample):
@@ -125,7 +126,10 @@ class Ekf2:
             self._too_early[type(sample)] += 1
 
     def update(self) -> bool:
-        """Process the pushed ImuSample; True when the filter advanced by a period."""
+        """Process the pushed ImuSample; True when the filter advanced by a period.
+
+        Raises ValueError for one whose numbers are not finite, as if it had not been pushed.
+        """
         raw, self._raw = self._raw, None
         if raw is None:
             return False

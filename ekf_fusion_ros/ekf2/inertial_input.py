@@ -7,10 +7,14 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
+from ekf_fusion_ros.ekf2.admission import not_finite
 from ekf_fusion_ros.ekf2.delayed_imu import DelayedImu
 from ekf_fusion_ros.ekf2.output_predictor import OutputPredictor
 from ekf_fusion_ros.ekf2.state import SECOND
+from ekf_fusion_ros.kernels.compile import machine_code
 from ekf_fusion_ros.kernels.inertial import INERTIAL
+from ekf_fusion_ros.kernels.period import NOT_FINITE
+from ekf_fusion_ros.kernels.period import TAKEN
 from ekf_fusion_ros.kernels.period import take_raw
 from ekf_fusion_ros.samples import NO_CLIPPING
 from ekf_fusion_ros.samples import ImuSample
@@ -50,23 +54,27 @@ class InertialInput:
         self._period = state['period']
         self.raw: Array = state['raw']
         self._clipping = NO_CLIPPING
+        self._take_raw = machine_code(take_raw)
 
     def add(self, sample: ImuSample, in_air: bool, output: OutputPredictor, x: Array,
             dt_avg: float) -> bool:
         """Take a raw sample; True when it completed a filter period.
 
-        Any other carries the output predictor on; x (24,), dt_avg mean filter period in s.
+        Any other carries the output predictor on; x (24,), dt_avg mean filter period in s. Its
+        arrays must be those of `admitted_imu`. Raises ValueError for numbers that are not finite.
         """
         time_us, angle, velocity, angle_dt, velocity_dt, clipping, _ = sample
-        complete = take_raw(
+        outcome = self._take_raw(
             self._state, output.state, x, time_us, angle, velocity, angle_dt, velocity_dt, dt_avg,
             in_air)
+        if outcome == NOT_FINITE:
+            raise not_finite(sample)
         if clipping != NO_CLIPPING:
             before = self._clipping
             first, second, third = (
                 bool(a or b) for a, b in zip(before, clipping, strict=True))
             self._clipping = (first, second, third)
-        if not complete:
+        if outcome == TAKEN:
             return False
         self.ring.append(DelayedImu(time_us, self._period.copy(), self._clipping))
         self._clipping = NO_CLIPPING

@@ -13,6 +13,7 @@ from ekf_fusion_ros.ekf2.state import VN
 from ekf_fusion_ros.ekf2.yaw_estimator import YawEstimator
 
 LAPSE = 0.5
+LAPSE_US = round(LAPSE * SECOND)
 """Time in s without inertial data above which the filter doubts what it knew before."""
 
 TILT_RATE, TILT_MAX = 0.2, 0.3
@@ -37,7 +38,7 @@ class InertialLapse:
         """Run once per filter period, after the prediction over it."""
         f, before_us = self._f, self._before_us
         self._before_us = f.t_horizon
-        if before_us is None:
+        if before_us is None or f.t_horizon - before_us <= LAPSE_US:
             return
         lapse = (f.t_horizon - before_us) / SECOND - float(f.imu.increments[6])
         if lapse > LAPSE:

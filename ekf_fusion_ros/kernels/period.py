@@ -20,6 +20,9 @@ from ekf_fusion_ros.kernels.yaw_bank import advance_bank
 Array = NDArray[np.float64]
 Record = NDArray[np.void]
 
+TAKEN, COMPLETE, NOT_FINITE = 0, 1, 2
+"""What becomes of a raw sample."""
+
 OBSERVABLE_COS = 0.8
 """Share of gravity along an accelerometer axis from which its bias shows at rest."""
 
@@ -28,20 +31,26 @@ OBSERVABLE_COS = 0.8
 def take_raw(
     inertial: Record, output: Record, x: Array, time_us: int, delta_angle: Array,
     delta_velocity: Array, angle_dt: float, velocity_dt: float, dt_avg: float, in_air: bool,
-) -> bool:
+) -> int:
     """Take a raw sample; unless it completes a filter period, carry the output over it.
 
     dt_avg mean filter period in s. The output of a sample that completes a period waits for the
-    update of the filter (finish_period). True where it did; see take_imu and propagate_predictor.
+    update of the filter (finish_period). Returns COMPLETE where it did, TAKEN where not, and
+    NOT_FINITE, with nothing done, for numbers that are not; see take_imu and propagate_predictor.
     """
+    total = angle_dt + velocity_dt
+    for i in range(3):
+        total += delta_angle[i] + delta_velocity[i]
+    if not math.isfinite(total):
+        return NOT_FINITE
     raw = inertial[0]['raw']
     raw[0:3] = delta_angle
     raw[3:6] = delta_velocity
     raw[6], raw[7] = angle_dt, velocity_dt
     if take_imu(inertial, time_us, in_air):
-        return True
+        return COMPLETE
     propagate_predictor(output, raw, x, inertial[0]['mean_dt'][0] / dt_avg)
-    return False
+    return TAKEN
 
 
 @kernel

@@ -52,8 +52,8 @@ CSV_SUFFIXES = ('.csv', '.csv.gz')
 # and the messages of a topic that are decoded together share the cost of each numpy call.
 BATCH = 2048
 COMPILE_NOTICE_AFTER = 3.0
-COMPILE_NOTICE = ('loading the numeric kernels; the first time compiles them, a minute or so, and the '
-                  'result is cached')
+COMPILE_NOTICE = ('loading the numeric kernels; the first time compiles them, a minute or so, '
+                  'and the result is cached')
 Say = Callable[[str], None]
 
 

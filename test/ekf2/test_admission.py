@@ -65,6 +65,7 @@ def test_what_is_no_measurement_is_named_and_changes_nothing(sample, words):
     stand(untouched)
     with pytest.raises(ValueError, match=words):
         ekf.push(sample(now_us))
+        ekf.update()
     stand(ekf, seconds=1.0, begin_us=now_us)
     stand(untouched, seconds=1.0, begin_us=now_us)
     np.testing.assert_array_equal(ekf.states(), untouched.states())
