@@ -133,21 +133,24 @@ class Attitude:
         """Take from a fix the yaw of two antennas, the velocity, and the declination."""
         if self.source == 'filter' and math.isfinite(fix.yaw):
             self._take_heading(fix.time_us, fix.yaw, relative=False)
-        if self.source == 'filter' and fix.has_velocity and np.isfinite(fix.velocity).all():
-            self._by_fixes.note(fix.time_us - delay_us, fix.velocity)
+        if fix.has_velocity and np.isfinite(fix.velocity).all():
+            self._note_velocity(self._by_fixes, fix.time_us - delay_us, fix.velocity)
         if self.params.declination_from_table and not self._place_known:
             self._place_known = True
             self._declination = make_field('ecl_table', 0.0).lookup(fix.lat, fix.lon).declination
 
     def push_flow(self, time_us: int, velocity: Array) -> None:
         """Take a velocity (3,) m/s NED that optical flow has measured."""
-        if self.source == 'filter':
-            self._by_flow.note(time_us, velocity)
+        self._note_velocity(self._by_flow, time_us, velocity)
 
     def push_estimate(self, time_us: int, velocity: Array) -> None:
         """Take a valid velocity (3,) m/s NED of the estimate."""
+        self._note_velocity(self._by_estimate, time_us, velocity)
+
+    def _note_velocity(self, gravity: Gravity, time_us: int, velocity: Array) -> None:
+        """Let a velocity tell gravity, which only the own filter needs and gathers force for."""
         if self.source == 'filter':
-            self._by_estimate.note(time_us, velocity)
+            gravity.note(time_us, velocity)
 
     def take_yaw(self, yaw: float, variance: float) -> None:
         """Turn to a yaw in rad that somebody knows."""
