@@ -246,6 +246,9 @@ class MotionHeading:
         if spread < 1e-6:
             return None
         match = complex(odometry.conj() @ weight @ fix)
+        if match == 0.0:
+            # fixes that do not move at all, as of a receiver that holds its last place
+            return None
         residual = fix - odometry * (match / abs(match))
         misfit = math.sqrt(float((residual.conj() @ weight @ residual).real)
                            / (2 * len(points) - 3))

@@ -10,10 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
+from ekf_fusion_ros.mathlib.rotation import quat_from_matrix
 from ekf_fusion_ros.mathlib.rotation import quat_from_rotation_vector
 from ekf_fusion_ros.mathlib.rotation import quat_inverse
 from ekf_fusion_ros.mathlib.rotation import quat_multiply
 from ekf_fusion_ros.mathlib.rotation import rotation_vector_from_quat
+from ekf_fusion_ros.mathlib.rotation import with_yaw
+from ekf_fusion_ros.mathlib.rotation import yaw_of
 from ekf_fusion_ros.params.two_topic import OdometryImuParams
 from ekf_fusion_ros.params.two_topic import TwoTopicParams
 from ekf_fusion_ros.samples import NAN3
@@ -82,10 +85,13 @@ class OdometryImu:
         declared = sample.reset_counter != last.reset_counter
         if declared:
             self._count('declared')
-        turn = self._turn_between(last.attitude, attitude, dt, declared)
         velocity = self._velocity(sample, attitude, last, dt, declared)
+        # A frame that has moved may have turned as well, by an angle the body could have.
+        moved = declared or self.jump == 'position'
+        turn = self._turn_between(last.attitude, attitude, dt, moved)
         increments = self._increments(last, velocity, turn, sample.time_us)
-        self._turn = turn / dt
+        share = dt / (dt + self._params.smoothing)
+        self._turn = self._turn + share * (turn / dt - self._turn)
         self._attitude = quat_multiply(self._attitude, quat_from_rotation_vector(turn))
         self._attitude = self._attitude / np.linalg.norm(self._attitude)
         self._last = _Reading(
@@ -105,17 +111,27 @@ class OdometryImu:
         self.jumps[kind] += 1
         self.jump = kind
 
-    def _turn_between(self, before: Array, after: Array, dt: float, declared: bool) -> Array:
-        """Return the rotation vector of the body over the interval; the last rate at a jump."""
-        turn = rotation_vector_from_quat(quat_multiply(quat_inverse(before), after))
-        angle = float(np.linalg.norm(turn))
-        if angle > math.pi:
-            turn = turn * (1.0 - 2.0 * math.pi / angle)
-            angle = 2.0 * math.pi - angle
-        jumped = angle > max(self._params.max_rate * dt, 0.1)
-        if jumped:
+    def _turn_between(self, before: Array, after: Array, dt: float, moved: bool) -> Array:
+        """Return the rotation vector of the body over the interval.
+
+        Where the frame is not the one of the message before (moved, or a turn that no body does),
+        down is where it was, but north is not: tilt is believed, and yaw goes on at its rate; all
+        of the attitude where the tilt cannot be believed.
+        """
+        limit = max(self._params.max_rate * dt, 0.1)
+        turn = _turn(before, after)
+        if np.linalg.norm(turn) > limit:
             self._count('attitude')
-        return self._turn * dt if jumped or declared else turn
+            moved = True
+        if not moved:
+            return turn
+        turn = _turn(before, self._with_expected_yaw(before, after, dt))
+        return self._turn * dt if np.linalg.norm(turn) > limit else turn
+
+    def _with_expected_yaw(self, before: Array, after: Array, dt: float) -> Array:
+        expected = quat_multiply(before, quat_from_rotation_vector(self._turn * dt))
+        yaw = yaw_of(matrix_from_quat(expected))
+        return quat_from_matrix(with_yaw(matrix_from_quat(after), yaw))
 
     def _velocity(
         self, sample: VisionSample, attitude: Array, last: _Reading, dt: float, declared: bool,
@@ -193,6 +209,13 @@ class OdometryImu:
         return sample._replace(
             quaternion=attitude, velocity=velocity, velocity_cov=covariance,
             velocity_frame=VelocityFrame.BODY_FRD)
+
+
+def _turn(before: Array, after: Array) -> Array:
+    """Return the shorter rotation vector (3,) from one attitude to another."""
+    turn: Array = rotation_vector_from_quat(quat_multiply(quat_inverse(before), after))
+    angle = float(np.linalg.norm(turn))
+    return turn * (1.0 - 2.0 * math.pi / angle) if angle > math.pi else turn
 
 
 def _with_direction(sample: VisionSample) -> VisionSample:

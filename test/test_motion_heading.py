@@ -160,3 +160,13 @@ def test_a_declared_jump_of_the_odometry_begins_a_new_window():
     heading.push_odometry(
         VisionSample(13_000_000, np.array((90.0, 0.0, 0.0)), NAN4, reset_counter=1))
     assert heading.status().path == 0.0
+
+
+def test_fixes_that_do_not_move_at_all_match_nothing():
+    """A receiver that holds its last place, while the odometry goes on."""
+    heading = MotionHeading(TwoTopicParams())
+    for k in range(400):
+        stamp = 100_000 * k
+        heading.push_odometry(VisionSample(stamp, np.array((0.1 * k, 0.0, 0.0)), NAN4))
+        assert heading.push_fix(GnssSample(stamp, LAT, LON, 0.0, 1.0, 1.0)) is None
+    assert math.isnan(heading.status().sigma) or heading.status().sigma > 1.0

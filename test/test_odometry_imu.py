@@ -161,3 +161,17 @@ def test_without_an_attitude_the_positions_tell_the_direction(source):
     for k in range(100):
         source.push(odometry(50_000 * k, (0.0, 0.1 * k, 0.0), NAN4, (2.0, 0.0, 0.0)))
     assert source.fused().velocity == pytest.approx((0.0, 2.0, 0.0), abs=1e-6)
+
+
+def test_a_frame_that_has_moved_over_a_gap_may_have_turned(source):
+    """The body turns at 0.1 rad/s; in 3 s of silence its source restarts, turned by 2 rad."""
+    turned = np.zeros(3)
+    for k in range(40):
+        later, new = (3.0, 1) if k >= 20 else (0.0, 0)
+        time = 0.1 * k + later
+        place = (100.0 * new, 50.0 * new, 0.0)
+        attitude = yawed(0.1 * time + 2.0 * new)
+        for imu in source.push(odometry(round(1e6 * time), place, attitude, (0.0, 0.0, 0.0))):
+            turned += imu.delta_angle
+    assert source.jumps['position'] == 1
+    assert turned == pytest.approx((0.0, 0.0, 0.1 * (3.9 + 3.0)), abs=0.02)
