@@ -43,9 +43,11 @@ from ekf_fusion_ros.odometry_heading import OdometryHeading
 from ekf_fusion_ros.receivers.bank import ReceiverStatus
 from ekf_fusion_ros.roles import AIRSPEED
 from ekf_fusion_ros.roles import ARMED
+from ekf_fusion_ros.roles import AUX_VELOCITY
 from ekf_fusion_ros.roles import FIX
 from ekf_fusion_ros.roles import FIX_VELOCITY
 from ekf_fusion_ros.roles import FIXES
+from ekf_fusion_ros.roles import FLOW
 from ekf_fusion_ros.roles import GPS_HEADING
 from ekf_fusion_ros.roles import IMU
 from ekf_fusion_ros.roles import LANDED
@@ -79,6 +81,9 @@ SECOND_US = 1_000_000
 NO_HEIGHT_EPV = 1e3
 YAW_WITHOUT_ODOMETRY = frozenset((FIX_VELOCITY, GPS_HEADING, MAGNETIC_FIELD))
 """Roles that tell the yaw of the body by themselves."""
+TELL_MOTION = frozenset((ODOMETRY, FIX, FLOW, AUX_VELOCITY, AIRSPEED))
+NO_MOTION = ('no topic in use tells horizontal motion, so that the place of the start is held: '
+             'add one of odometry, fix, flow')
 
 
 class FusionSession:
@@ -567,7 +572,9 @@ class FusionSession:
     def warnings(self) -> list[str]:
         """Return what is wrong with the inputs, in sentences."""
         lack = self._heading.lack if self._inertial_role == ODOMETRY else ''
-        said = (self._down.sentence, self._twist.sentence, lack)
+        blind = NO_MOTION if self._local and self.roles is not None \
+            and not self.roles & TELL_MOTION else ''
+        said = (self._down.sentence, self._twist.sentence, lack, blind)
         return [*self._rates.slow(), *filter(None, said)]
 
     def receivers(self) -> Sequence[ReceiverStatus]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ekf_fusion_ros.ekf2.operator_view import operator_values
+from ekf_fusion_ros.ekf2.state import SECOND
 from ekf_fusion_ros.ekf2.state import WIND
 from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import HealthLevel
@@ -16,6 +17,9 @@ from ekf_fusion_ros.params.ekf2 import ZERO
 
 if TYPE_CHECKING:
     from ekf_fusion_ros.ekf2.ekf2 import Ekf2
+
+REJECTED_US = 3 * SECOND
+"""Longer than one wild fix or a short disturbance lasts."""
 
 
 def nav_state(ekf: Ekf2) -> NavState:
@@ -84,6 +88,11 @@ def _state(ekf: Ekf2) -> tuple[HealthLevel, str]:
         return HealthLevel.ERROR, f'dead reckoning on inertial data for {seconds:.0f} s'
     if wants_gnss and not flags.gps:
         return HealthLevel.WARN, _without_gnss(ekf)
+    rejected_us = f.t_now - f.times.hor_pos
+    if flags.gps and f.fix is not None and f.recent(f.fix.time_us, 2 * SECOND) \
+            and rejected_us > REJECTED_US:
+        return HealthLevel.WARN, (f'GNSS rejected for {rejected_us * 1e-6:.0f} s, it contradicts '
+                                  f'the estimate; {_sources(ekf)}')
     return HealthLevel.OK, f'ok: {_sources(ekf)}'
 
 

@@ -9,6 +9,7 @@ import platform
 from typing import TYPE_CHECKING
 from typing import Any
 
+from ekf_fusion_ros.ekf2.events import EventKind
 from ekf_fusion_ros.estimator import AidStatus
 from ekf_fusion_ros.health.home import Home
 from ekf_fusion_ros.health.status import NavigationStatus
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from ekf_fusion_ros.replay.runner import Progress
 
 SECOND_US = 1e6
+FIXES_LOST = EventKind.GPS_FUSION_TIMEOUT.value
 PACKAGES = ('ekf_fusion_ros', 'numpy', 'numba', 'rosbags')
 
 
@@ -164,6 +166,11 @@ def _gist(summary: dict[str, Any]) -> list[str]:
         lines.append(f'{summary["rows"]} rows in frame {summary["frame"]}, the first '
                      f'{after:.1f} s after the start')
     lines += [f'warning: {warning}' for warning in summary['warnings']]
+    lost = [event for event in summary['events'] if event['text'] == FIXES_LOST]
+    if lost:
+        often = 'once' if len(lost) == 1 else f'{len(lost)} times'
+        lines.append(f'warning: {FIXES_LOST}, {often}: fixes and the other topics contradict '
+                     'each other')
     for which in ('fix', 'withheld'):
         distance = summary[f'{which}_distance']
         if distance is not None:
