@@ -55,7 +55,7 @@ class Alignment:
         self._mag.pop()
         self._baro.pop()
         self._baro.learn_offset()
-        if not self._enough_samples():
+        if self._lacking():
             return False
         if not self._tilt_from_gravity():
             return False
@@ -74,21 +74,39 @@ class Alignment:
             self._rate = (1.0 - SHARE) * self._rate + SHARE * rate
         self._inertial_samples += 1
 
-    def _enough_samples(self) -> bool:
+    @property
+    def obstacle(self) -> str:
+        """What keeps the filter from starting, in words."""
+        lacking = self._lacking()
+        return f'not enough samples of {lacking} yet' if lacking else self._unlike_gravity()
+
+    def _lacking(self) -> str:
+        """Return the sensor of which there are not enough samples, '' where there are."""
         if self._mag.usable and self._mag.count < self._needed:
-            return False
+            return 'the magnetometer'
         height = self._f.params.height
         wait_for_baro = height.wait_for_baro or height.reference == 'baro' or self._baro.count > 0
         if wait_for_baro:
-            return self._baro.count >= self._needed
-        return self._inertial_samples >= self._needed
+            return '' if self._baro.count >= self._needed else 'the barometer'
+        return '' if self._inertial_samples >= self._needed else 'the IMU'
+
+    def _unlike_gravity(self) -> str:
+        """Return why the specific force does not tell the tilt, '' where it does."""
+        norm = float(np.linalg.norm(self._accel))
+        if not FORCE_MIN <= norm <= FORCE_MAX:
+            return (f'the specific force is {norm:.1f} m/s^2, and must be within 20 % of gravity '
+                    'for a tilt: units of the IMU, or a start in motion')
+        rate = float(np.linalg.norm(self._rate))
+        if rate > RATE_MAX:
+            return (f'the body turns at {math.degrees(rate):.0f} deg/s, and must be slower than '
+                    f'{math.degrees(RATE_MAX):.0f} for a tilt')
+        return ''
 
     def _tilt_from_gravity(self) -> bool:
         f = self._f
-        norm = float(np.linalg.norm(self._accel))
-        at_one_g = FORCE_MIN <= norm <= FORCE_MAX
-        if not at_one_g or float(np.linalg.norm(self._rate)) > RATE_MAX:
+        if self._unlike_gravity():
             return False
+        norm = float(np.linalg.norm(self._accel))
         unit = self._accel / norm
         pitch = math.asin(float(unit[0]))
         roll = math.atan2(-float(unit[1]), -float(unit[2]))

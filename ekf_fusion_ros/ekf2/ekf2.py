@@ -204,6 +204,10 @@ class Ekf2:
             self._nav = nav_state(self)
         return self._nav
 
+    def alignment_obstacle(self) -> str:
+        """Return what keeps the filter from starting, in words."""
+        return self._alignment.obstacle
+
     def states(self) -> Array:
         """Return the states (24,) at the fusion horizon; `ekf2.state.STATES` is their index map.
 

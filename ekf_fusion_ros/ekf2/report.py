@@ -73,7 +73,9 @@ def _state(ekf: Ekf2) -> tuple[HealthLevel, str]:
     if not f.t_now:
         return HealthLevel.WARN, 'waiting for inertial data'
     if not ekf.initialised:
-        return HealthLevel.WARN, 'gathering samples for the initial alignment'
+        reason = ekf.alignment_obstacle()
+        return HealthLevel.WARN, 'gathering samples for the initial alignment' + (
+            f': {reason}' if reason else '')
     if not flags.tilt_align:
         return HealthLevel.WARN, 'aligning tilt'
     if not flags.yaw_align:

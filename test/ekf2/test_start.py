@@ -218,3 +218,18 @@ def test_imu_place_is_taken_off_the_output():
     position = bench.ekf.nav_state().position
     # Turned by 90 deg, 0.4 m ahead are east and 0.2 m to the left are north.
     np.testing.assert_allclose(position, (-0.2, -0.4, -0.1), atol=5e-3)
+
+
+@pytest.mark.parametrize(('spoil', 'words'), [
+    (lambda bench: setattr(bench, 'force', bench.force / GRAVITY), 'specific force is 1.0 m/s^2'),
+    (lambda bench: setattr(bench, 'rate', np.array((0.0, 0.0, 1.0))), 'turns at 57 deg/s'),
+    (lambda bench: bench.sending.remove('baro'), 'samples of the barometer'),
+    (lambda bench: bench.sending.clear(), 'samples of the magnetometer'),
+])
+def test_what_keeps_the_filter_from_starting_is_said(spoil, words):
+    """An IMU in units of g, a start in a turn, sensors that are configured and silent."""
+    bench = Bench()
+    spoil(bench)
+    bench.run(4.0)
+    assert bench.ekf.nav_state() is None
+    assert words in bench.ekf.health().text
