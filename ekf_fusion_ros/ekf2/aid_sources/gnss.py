@@ -37,6 +37,11 @@ USABLE_ACCURACY = 1000.0
 
 DATA_TIMEOUT_US = 10 * SECOND
 DATA_TIMEOUT_AIDED_US = 1 * SECOND
+USUAL_INTERVAL_US = 200_000
+SILENT_INTERVALS = 2.5
+"""Usual intervals without a fix, or DATA_TIMEOUT_AIDED_US if that is longer, that are silence: a
+receiver of 1 Hz is as regular as one of 5 Hz."""
+
 INTERMITTENT_US = 1 * SECOND
 NIS_SHARE = 0.4
 """Share of one fix in the mean of the normalised innovations: about four fixes count."""
@@ -68,6 +73,7 @@ class Gnss:
         self.height_intermittent = True
         self.vision_yaw_forbidden = False
         self._previous_fix_us = 0
+        self._interval_us = USUAL_INTERVAL_US
         self._velocity_nis = 1.0
         self._has_aided = False
 
@@ -166,6 +172,9 @@ class Gnss:
         if popped is not None:
             if self._f.fix is not None:
                 self._previous_fix_us = self._f.fix.time_us
+                # An outage is no usual interval, a slower rate is one after a few fixes.
+                self._interval_us = min(
+                    popped[1].time_us - self._previous_fix_us, 2 * self._interval_us)
             self._f.fix = popped[1]
 
     def step(self) -> None:
@@ -185,6 +194,9 @@ class Gnss:
             self._remove_lever_arm()
             self._fuse()
 
+    def _silence_us(self) -> float:
+        return max(DATA_TIMEOUT_AIDED_US, SILENT_INTERVALS * self._interval_us)
+
     def _watch_silence(self) -> None:
         f = self._f
         if not f.flags.gps or f.fix is None:
@@ -192,7 +204,7 @@ class Gnss:
         silence = f.t_horizon - f.fix.time_us
         if silence > DATA_TIMEOUT_US:
             self.stop(EventKind.GPS_DATA_STOPPED)
-        elif silence > DATA_TIMEOUT_AIDED_US and f.flags.aided_other_than(f.flags.gps):
+        elif silence > self._silence_us() and f.flags.aided_other_than(f.flags.gps):
             self.stop(EventKind.GPS_DATA_STOPPED_ALTERNATE)
 
     def _start_or_stop(self) -> None:
