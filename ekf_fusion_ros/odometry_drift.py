@@ -105,7 +105,8 @@ class OdometryDrift:
             np.array(column) for column in zip(*self._points, strict=True))
         odometry, fix = odometry - odometry.mean(), fix - fix.mean()
         match = complex(np.vdot(odometry, fix))
-        turn = match / max(abs(match), 1e-9)
+        # Fixes that stand still agree with no turn: any leaves all that the odometry has moved.
+        turn = match / abs(match) if match else 1.0 + 0j
         left = float(np.mean(np.abs(fix - turn * odometry) ** 2))
         white = float(np.mean(variance - 2.0 * (np.conj(turn) * covariance).real))
         return max(left - white, LEAST_SHARE * left) / 2.0

@@ -61,6 +61,13 @@ def test_wrong_fixes_show_once_they_are_old(until, shows):
     assert (found > 1.0) is shows
 
 
+def test_fixes_that_stand_still_make_no_good_odometry():
+    found = OdometryDrift(DriftParams(hold=0.0))
+    for k in range(60):
+        found.note(k * SECOND, 1.0 * k, [complex(k)], [0j])
+    assert found.news(0).walk > 5.0
+
+
 def test_standing_adds_nothing():
     found = OdometryDrift(DriftParams(hold=0.0, path=5.0))
     for k in range(10):

@@ -38,7 +38,8 @@ class InertialLapse:
         """Run once per filter period, after the prediction over it."""
         f, before_us = self._f, self._before_us
         self._before_us = f.t_horizon
-        if before_us is None or f.t_horizon - before_us <= LAPSE_US:
+        if before_us is None or f.t_horizon - before_us <= LAPSE_US \
+                or not f.params.imu.doubt_lapses:
             return
         lapse = (f.t_horizon - before_us) / SECOND - float(f.imu.increments[6])
         if lapse > LAPSE:

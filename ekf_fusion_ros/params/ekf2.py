@@ -68,6 +68,9 @@ class ImuParams:
     adapt_accel_noise: bool = param(
         True, 'Raise the accelerometer noise while GNSS velocity shows that it is larger than '
         'stated.')
+    doubt_lapses: bool = param(
+        True, 'Make attitude, velocity and position uncertain by the time that passes without '
+        'inertial data, from 0.5 s on; keep the velocity meanwhile.')
     inhibit_accel_bias: bool = param(False, 'Do not estimate accelerometer biases.')
     moving_scaler: float = param(
         1.0, 'Scale of the thresholds of the at-rest detection.', min=0.1, max=10,
@@ -129,6 +132,9 @@ class GnssParams:
         True, 'Where velocities prove the yaw to be false, doubt also the gyro bias and the wind '
         'that it has taught, and prefer the yaw of the EKF-GSF bank, once it is certain, to the '
         'course of a fixed wing. Off, as in PX4, both stay.')
+    adapt_silence: bool = param(
+        True, 'Take a receiver of less than 2.5 Hz to be silent after 2.5 of its intervals, where '
+        'other sources go on; off, after a second, whatever its rate.')
     place_early_fixes: bool = param(
         True, 'Give the fixes that wait when the origin is set their place; PX4 takes them to be '
         'at the origin.')

@@ -195,7 +195,9 @@ class Gnss:
             self._fuse()
 
     def _silence_us(self) -> float:
-        return max(DATA_TIMEOUT_AIDED_US, SILENT_INTERVALS * self._interval_us)
+        """Return the time without a fix after which other sources go on alone."""
+        usual_us = self._interval_us if self._f.params.gnss.adapt_silence else 0
+        return max(DATA_TIMEOUT_AIDED_US, SILENT_INTERVALS * usual_us)
 
     def _watch_silence(self) -> None:
         f = self._f
