@@ -194,10 +194,9 @@ class Gnss:
             self._remove_lever_arm()
             self._fuse()
 
-    def _silence_us(self) -> float:
-        """Return the time without a fix after which other sources go on alone."""
-        usual_us = self._interval_us if self._f.params.gnss.adapt_silence else 0
-        return max(DATA_TIMEOUT_AIDED_US, SILENT_INTERVALS * usual_us)
+    def _usual_silence_us(self) -> float:
+        """Return the time without a fix that is nothing unusual for this receiver."""
+        return SILENT_INTERVALS * self._interval_us if self._f.params.gnss.adapt_silence else 0.0
 
     def _watch_silence(self) -> None:
         f = self._f
@@ -206,7 +205,8 @@ class Gnss:
         silence = f.t_horizon - f.fix.time_us
         if silence > DATA_TIMEOUT_US:
             self.stop(EventKind.GPS_DATA_STOPPED)
-        elif silence > self._silence_us() and f.flags.aided_other_than(f.flags.gps):
+        elif silence > DATA_TIMEOUT_AIDED_US and silence > self._usual_silence_us() \
+                and f.flags.aided_other_than(f.flags.gps):
             self.stop(EventKind.GPS_DATA_STOPPED_ALTERNATE)
 
     def _start_or_stop(self) -> None:
