@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -86,8 +85,9 @@ def _state(ekf: Ekf2) -> tuple[HealthLevel, str]:
         reason = f' ({failing} failing)' if failing else ''
         return HealthLevel.WARN, f'waiting for the GNSS checks to pass{reason}'
     if f.dead_reckoning:
-        seconds = (f.t_now - f.last_aiding_us) * 1e-6 if f.last_aiding_us else math.inf
-        return HealthLevel.ERROR, f'dead reckoning on inertial data for {seconds:.0f} s'
+        seconds = (f.t_now - f.last_aiding_us) * 1e-6
+        since = f'for {seconds:.0f} s' if f.last_aiding_us else 'since the start'
+        return HealthLevel.ERROR, f'dead reckoning on inertial data {since}'
     if wants_gnss and not flags.gps:
         return HealthLevel.WARN, _without_gnss(ekf)
     rejected_us = f.t_now - f.times.hor_pos

@@ -17,6 +17,8 @@ from ekf_fusion_ros.ekf2.operator_view import FAULTS
 from ekf_fusion_ros.ekf2.operator_view import GPS_CHECKS
 from ekf_fusion_ros.ekf2.operator_view import INNOVATION_CHECKS
 from ekf_fusion_ros.ekf2.state import STATES
+from ekf_fusion_ros.params.ekf2 import Ekf2Params
+from ekf_fusion_ros.params.ekf2 import GnssParams
 
 
 @pytest.fixture
@@ -48,6 +50,12 @@ def test_before_the_first_sample_it_says_so():
     told = values(Bench())
     assert told['control_mode_flags'] == told['filter_fault_flags'] == 'none'
     assert told['gps_check.gps_fix'] == 'skipped'
+
+
+def test_without_any_aid_it_reckons_since_the_start():
+    bench = Bench(Ekf2Params(gnss=GnssParams(enabled=False)))
+    bench.run(8.0)
+    assert bench.ekf.health().text == 'dead reckoning on inertial data since the start'
 
 
 def test_receiver_checks_pass_fail_or_are_skipped(bench):
