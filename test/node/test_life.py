@@ -202,7 +202,9 @@ def test_a_node_that_is_killed_in_flight_and_started_again_finds_its_way(
 
 def test_a_publisher_that_comes_late_is_heard(start_fuser: StartFuser, peer: Peer) -> None:
     fuser = start_fuser()
-    peer.until(lambda: 'no publisher' in peer.texts().get('estimator', ''), fuser)
-    assert peer.texts()['estimator'].startswith('waiting for odometry: /odom has 0 messages')
+    silence = 'waiting for odometry: /odom has 0 messages, no publisher'
+    peer.until(lambda: peer.texts().get('estimator') == silence, fuser)
+    assert peer.texts()['output'] == 'nothing on /odometry/filtered'
+    peer.until(lambda: f'nothing is published: {silence}' in fuser.output, fuser)
     Drive(peer, fuser).connect().between(0.0, 40.0).until_row(39.0)
     peer.until(lambda: 'publishing /odometry/filtered' in fuser.output, fuser)
