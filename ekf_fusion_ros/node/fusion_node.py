@@ -103,6 +103,7 @@ class FusionNode(Node):  # type: ignore[misc]
         if preparation.error is not None:
             self._guard.tell('preparing the kernels', preparation.error)
         self.start()
+        self._reporting.report()
 
     def start(self) -> None:
         """Subscribe and run the filter."""

@@ -331,6 +331,9 @@ def test_while_kernels_compile_the_node_says_so(monkeypatch: pytest.MonkeyPatch)
         node.begin(lambda: False)
         until(lambda: PREPARING in heard)
         monkeypatch.setattr(NeverReady, 'done', True)
+        # what it waits for comes with the start, not with the next turn of the timer
+        executor.remove_node(node)
+        node._start_when_ready()
         until(lambda: any(one.startswith('waiting for odometry') for one in heard))
     finally:
         executor.shutdown()
