@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import replace
 from functools import lru_cache
+import math
 
 import numpy as np
 
@@ -79,9 +80,26 @@ def _common(seed: int) -> list:
 
 def fly(
     receivers: Mapping[str, Gnss], seed: int = 0, changes: Mapping[str, Change] | None = None,
-    overrides: Mapping[str, object] | None = None,
+    overrides: Mapping[str, object] | None = None, until: float = math.inf,
 ) -> Flown:
-    """Fly with receivers by role; `changes` alter or drop (None) fixes by their time in s."""
+    """Fly with receivers by role; `changes` alter or drop (None) fixes by their time in s.
+
+    What is flown without changes is flown once, and to the end: many a test compares with it.
+    """
+    if changes or overrides:
+        return _fly(receivers, seed, changes, overrides, until)
+    return _fly_once(tuple(receivers.items()), seed)
+
+
+@lru_cache(maxsize=None)
+def _fly_once(receivers: tuple[tuple[str, Gnss], ...], seed: int) -> Flown:
+    return _fly(dict(receivers), seed, None, None, math.inf)
+
+
+def _fly(
+    receivers: Mapping[str, Gnss], seed: int, changes: Mapping[str, Change] | None,
+    overrides: Mapping[str, object] | None, until: float,
+) -> Flown:
     session = FusionSession(
         with_overrides(Params(), overrides or {}), (*INPUTS, *receivers))
     arrivals = _common(seed) + list(Scenario(
@@ -90,6 +108,8 @@ def fly(
     outputs = []
     for arrival in arrivals:
         sample = arrival.sample
+        if 1e-6 * (arrival.time_us - FLOWN_FROM) > until:
+            break
         if changes and arrival.role in changes:
             sample = changes[arrival.role](1e-6 * (sample.time_us - FLOWN_FROM), sample)
         if sample is not None:

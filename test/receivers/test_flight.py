@@ -41,6 +41,9 @@ def shifted(metres):
     return lambda _, fix: fix._replace(lat=fix.lat + metres * METRE)
 
 
+BOTH_QUIET, APART = {'fix': QUIET, 'fix_2': QUIET}, {'fix_2': shifted(1.5)}
+
+
 def drifting(speed, since=SETTLED):
     """Return what moves fixes north by ever more."""
     return lambda t, fix: fix._replace(lat=fix.lat + max(0.0, speed * (t - since)) * METRE)
@@ -80,7 +83,8 @@ def test_the_blend_beats_the_better_receiver(flights):
 def test_no_step_where_one_goes_comes_back_or_lies(flights, role, change):
     """At each switch; later the outputs differ by the noise of the receiver that is left."""
     for seed in SEEDS:
-        flown = fly({'fix': BETTER, 'fix_2': WORSE}, seed, {role: between(OFF, ON, change)})
+        flown = fly({'fix': BETTER, 'fix_2': WORSE}, seed, {role: between(OFF, ON, change)},
+                    until=ON + 2.0)
         for switch in (OFF, ON):
             assert change_of_gap(flown, flights[seed], switch) < STEP
 
@@ -106,7 +110,7 @@ def test_one_that_comes_back_is_followed_gently(change, back):
 def test_a_change_of_claimed_accuracy_makes_no_step(flights, role):
     poorer = between(OFF, ON, lambda fix: fix._replace(eph=3.0 * fix.eph, epv=3.0 * fix.epv))
     for seed in SEEDS:
-        flown = fly({'fix': BETTER, 'fix_2': WORSE}, seed, {role: poorer})
+        flown = fly({'fix': BETTER, 'fix_2': WORSE}, seed, {role: poorer}, until=ON + 2.0)
         for switch in (OFF, ON):
             assert change_of_gap(flown, flights[seed], switch) < STEP
 
@@ -130,17 +134,20 @@ def test_of_two_a_drift_is_bounded_by_the_gate():
     assert np.abs(flown.error[flown.time > SETTLED, 0]).max() < 5.0
 
 
+@pytest.fixture(scope='module')
+def disagreeing():
+    return fly(BOTH_QUIET, 0, APART)
+
+
 @pytest.mark.parametrize('role', ['fix', 'fix_2'])
 @pytest.mark.parametrize('change', [dropped, biased])
-def test_receivers_that_disagree_hand_over_slowly(role, change):
+def test_receivers_that_disagree_hand_over_slowly(disagreeing, role, change):
     """Of two without noise, 1.5 m apart, either may go or lie: the output stays."""
-    quiet, apart = {'fix': QUIET, 'fix_2': QUIET}, {'fix_2': shifted(1.5)}
-    flown = fly(quiet, 0, apart)
     window = between(OFF, ON, change)
-    both = {**apart, role: lambda t, fix: (
-        apart.get(role, lambda _, same: same)(t, window(t, fix)) if window(t, fix) else None)}
-    assert moved(flown, fly(quiet, 0, both), SETTLED) < STEP
-    between_both = flown.error[flown.time > SETTLED, 0].mean()
+    both = {**APART, role: lambda t, fix: (
+        APART.get(role, lambda _, same: same)(t, window(t, fix)) if window(t, fix) else None)}
+    assert moved(disagreeing, fly(BOTH_QUIET, 0, both), SETTLED) < STEP
+    between_both = disagreeing.error[disagreeing.time > SETTLED, 0].mean()
     assert between_both == pytest.approx(0.75, abs=0.1)
 
 

@@ -14,8 +14,8 @@ from ekf_fusion_ros.simulation.scenario import Scenario
 from ekf_fusion_ros.simulation.scenario import default_sensors
 from ekf_fusion_ros.simulation.trajectory import Flight
 
-SECONDS = 110.0
-WRONG_FROM = 90.0
+SECONDS = 55.0
+WRONG_FROM = 45.0
 EARTH_RADIUS = 6.371e6
 
 
