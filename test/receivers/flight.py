@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import replace
+from functools import cache
 from functools import lru_cache
 import math
 
@@ -91,7 +92,7 @@ def fly(
     return _fly_once(tuple(receivers.items()), seed)
 
 
-@lru_cache(maxsize=None)
+@cache
 def _fly_once(receivers: tuple[tuple[str, Gnss], ...], seed: int) -> Flown:
     return _fly(dict(receivers), seed, None, None, math.inf)
 
