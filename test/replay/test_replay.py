@@ -7,7 +7,6 @@ from dataclasses import replace
 import gzip
 import json
 import math
-import shutil
 
 import numpy as np
 import pytest
@@ -409,18 +408,24 @@ def test_sensor_csv(tmp_path):
     assert np.degrees(table[-1, 11]) == pytest.approx(90.0, abs=1.0)
 
 
-@pytest.mark.parametrize('storage', [
-    'rl_husky_db3', 'rl_husky_db3_zstd_file', 'rl_husky_db3_zstd_message', 'rl_husky_mcap_zstd'])
-def test_storages_of_a_real_recording_give_one_track(shared, tmp_path, storage):
+@pytest.fixture(scope='module')
+def husky(shared, tmp_path_factory):
+    """A folder of a real recording in several storages, and the track of one of them."""
     folder = shared / 'data' / 'rl_husky'
     if not folder.is_dir():
         pytest.skip('recording rl_husky is not beside the repository')
-    for name in (storage, 'rl_husky_mcap'):
-        assert run(folder / name, tmp_path / name, '--end', '40') == 0
-    ours, theirs = (tmp_path / name / 'trajectory.csv' for name in (storage, 'rl_husky_mcap'))
-    assert ours.read_bytes() == theirs.read_bytes()
-    assert len(rows(tmp_path / storage)) > 500
-    shutil.rmtree(tmp_path)
+    output = tmp_path_factory.mktemp('husky')
+    assert run(folder / 'rl_husky_mcap', output, '--end', '40') == 0
+    return folder, (output / 'trajectory.csv').read_bytes()
+
+
+@pytest.mark.parametrize('storage', [
+    'rl_husky_db3', 'rl_husky_db3_zstd_file', 'rl_husky_db3_zstd_message', 'rl_husky_mcap_zstd'])
+def test_storages_of_a_real_recording_give_one_track(husky, tmp_path, storage):
+    folder, track = husky
+    assert run(folder / storage, tmp_path, '--end', '40') == 0
+    assert (tmp_path / 'trajectory.csv').read_bytes() == track
+    assert len(rows(tmp_path)) > 500
 
 
 def test_odometry_alone_is_local(shared, tmp_path):
