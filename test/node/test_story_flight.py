@@ -131,8 +131,8 @@ def test_ekf2_from_the_first_sample_to_the_loss_of_gnss(
         'flow': Vector3Stamped})
     flight.senders |= {
         'fix': (20, fix), 'mag': (10, field), 'range': (10, below), 'flow': (10, flow)}
-    for sentence in ('gathering samples for the initial alignment$', 'aligning tilt$',
-                     'waiting for the GNSS checks to pass$'):
+    for sentence in ('gathering samples for the initial alignment: not enough samples of the ',
+                     'aligning tilt$', 'waiting for the GNSS checks to pass$'):
         flight.until_told(sentence, HealthLevel.WARN)
     flight.until_told('ok: fusing GNSS, .*optical flow', HealthLevel.OK)
     del flight.senders['fix']
