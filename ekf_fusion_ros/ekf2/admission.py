@@ -24,7 +24,7 @@ THREE_FLOATS = 24
 """Strides and size in bytes of three numbers in a row."""
 
 FLOAT = np.dtype(np.float64)
-"""The one object of native float64; another that equals it costs a copy, no more."""
+"""Of the byte order of this machine: another is not equal."""
 
 MEASURED: dict[type, dict[str, Shape]] = {
     ImuSample: {'delta_angle': THREE, 'delta_velocity': THREE},
@@ -69,7 +69,7 @@ def admitted_imu(sample: ImuSample) -> ImuSample:
     _, angle, velocity, _, _, _, _ = sample
     # Of every raw sample, so without a call: see _is_plain.
     if (type(angle) is type(velocity) is np.ndarray
-            and angle.dtype is FLOAT and velocity.dtype is FLOAT
+            and angle.dtype == velocity.dtype == FLOAT
             and angle.nbytes == velocity.nbytes == THREE_FLOATS
             and angle.strides == velocity.strides == CONTIGUOUS):
         return sample
@@ -99,7 +99,7 @@ def admitted(sample: Any) -> Any:
 
 
 def _is_plain(value: Any, shape: Shape) -> bool:
-    return (type(value) is np.ndarray and value.shape == shape and value.dtype is FLOAT
+    return (type(value) is np.ndarray and value.shape == shape and value.dtype == FLOAT
             and value.flags.c_contiguous)
 
 
