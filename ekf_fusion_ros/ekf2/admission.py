@@ -26,7 +26,7 @@ THREE_FLOATS = 24
 FLOAT = np.dtype(np.float64)
 """Of the byte order of this machine: another is not equal."""
 
-MEASURED: dict[type, dict[str, Shape]] = {
+MEASURED: dict[type[Any], dict[str, Shape]] = {
     ImuSample: {'delta_angle': THREE, 'delta_velocity': THREE},
     MagSample: {'field': THREE},
     FlowSample: {'flow': (2,)},
@@ -34,7 +34,7 @@ MEASURED: dict[type, dict[str, Shape]] = {
 }
 """Arrays that must be finite."""
 
-PERHAPS_MEASURED: dict[type, dict[str, Shape]] = {
+PERHAPS_MEASURED: dict[type[Any], dict[str, Shape]] = {
     GnssSample: {'velocity': THREE},
     VisionSample: {'position': THREE, 'quaternion': (4,), 'velocity': THREE,
                    'position_var': THREE, 'velocity_cov': (3, 3)},
@@ -42,7 +42,7 @@ PERHAPS_MEASURED: dict[type, dict[str, Shape]] = {
 }
 """Arrays whose NaN means that nothing was measured."""
 
-NUMBERS: dict[type, tuple[str, ...]] = {
+NUMBERS: dict[type[Any], tuple[str, ...]] = {
     ImuSample: ('delta_angle_dt', 'delta_velocity_dt'),
     GnssSample: ('lat', 'lon'),
     BaroSample: ('altitude',),
@@ -51,14 +51,16 @@ NUMBERS: dict[type, tuple[str, ...]] = {
 }
 
 
-def _places(fields: dict[type, dict[str, Shape]]) -> dict[type, tuple[tuple[int, Shape], ...]]:
+def _places(
+    fields: dict[type[Any], dict[str, Shape]],
+) -> dict[type[Any], tuple[tuple[int, Shape], ...]]:
     return {kind: tuple((kind._fields.index(name), shape) for name, shape in shapes.items())
-            for kind, shapes in fields.items() if hasattr(kind, '_fields')}
+            for kind, shapes in fields.items()}
 
 
 _MEASURED, _PERHAPS = _places(MEASURED), _places(PERHAPS_MEASURED)
 _NUMBERS = {kind: tuple(kind._fields.index(name) for name in names)
-            for kind, names in NUMBERS.items() if hasattr(kind, '_fields')}
+            for kind, names in NUMBERS.items()}
 
 
 def admitted_imu(sample: ImuSample) -> ImuSample:
@@ -110,22 +112,22 @@ def _changed(sample: Any) -> Any:
     changes = {name: _as_array(getattr(sample, name), shape, f'{kind.__name__}.{name}')
                for name, shape in {**must, **may}.items()}
     changed = sample._replace(**changes)
-    for name in _finite_fields(kind):
-        if not np.isfinite(getattr(changed, name)).all():
-            raise not_finite(changed)
+    if _wrong(changed):
+        raise not_finite(changed)
     return changed
 
 
 def not_finite(sample: Any) -> ValueError:
     """Return the error that names the fields of a sample that are not finite, but must be."""
+    return ValueError(f'{", ".join(_wrong(sample))}: must be finite')
+
+
+def _wrong(sample: Any) -> list[str]:
+    """Return in words the fields that must be finite and are not."""
     kind = type(sample)
-    wrong = [f'{kind.__name__}.{name} is {getattr(sample, name)}' for name in _finite_fields(kind)
-             if not np.isfinite(getattr(sample, name)).all()]
-    return ValueError(f'{", ".join(wrong)}: must be finite')
-
-
-def _finite_fields(kind: type) -> tuple[str, ...]:
-    return *MEASURED.get(kind, {}), *NUMBERS.get(kind, ())
+    return [f'{kind.__name__}.{name} is {getattr(sample, name)}'
+            for name in (*MEASURED.get(kind, {}), *NUMBERS.get(kind, ()))
+            if not np.isfinite(getattr(sample, name)).all()]
 
 
 def _as_array(value: Any, shape: Shape, name: str) -> Any:

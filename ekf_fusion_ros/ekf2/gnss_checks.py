@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 import math
 
@@ -72,12 +71,11 @@ class GnssChecks:
         wait = round(self._f.params.gnss.checks.start_time * SECOND)
         return self._f.late(self.last_pass_us, wait)
 
-    def blocking(self) -> Iterator[str]:
-        """Yield the names of the selected checks that have failed; the fix test is always on."""
+    def blocking(self) -> list[str]:
+        """Return the names of the selected checks that have failed; the fix test is always on."""
         selected = self._f.params.gnss.checks
-        for name, result in self.results.items():
-            if result.failed and (name == 'fix' or getattr(selected, name)):
-                yield name
+        return [name for name, result in self.results.items()
+                if result.failed and (name == 'fix' or getattr(selected, name))]
 
     def run(self, fix: GnssSample) -> None:
         """Judge a fix."""
@@ -161,7 +159,7 @@ class GnssChecks:
 
     def _stamp(self) -> None:
         """Note the time of the verdict."""
-        if not self._ran or any(True for _ in self.blocking()):
+        if self.blocking() or not self._ran:
             self.last_fail_us = self._f.t_now
         else:
             self.last_pass_us = self._f.t_now

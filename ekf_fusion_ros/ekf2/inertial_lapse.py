@@ -13,8 +13,9 @@ from ekf_fusion_ros.ekf2.state import VN
 from ekf_fusion_ros.ekf2.yaw_estimator import YawEstimator
 
 LAPSE = 0.5
-LAPSE_US = round(LAPSE * SECOND)
 """Time in s without inertial data above which the filter doubts what it knew before."""
+
+LAPSE_US = round(LAPSE * SECOND)
 
 TILT_RATE, TILT_MAX = 0.2, 0.3
 """1-sigma rate in rad/s at which tilt wanders off, and the tilt in rad that vehicles keep to."""

@@ -65,15 +65,20 @@ class OpticalFlow(Sensor):
         distance = f.agl / float(rot[2, 2])
         x, y = (params.scale * sample.flow + rotation) * (distance / sample.dt)
         velocity = np.array((-y, x))
-        body = rot.T @ f.x[VELOCITY]
-        body[:2] = velocity
-        f.attitude.push_flow(sample.time_us - round(0.5 * SECOND * sample.dt), rot @ body)
+        self._tell_attitude(sample.time_us - round(0.5 * SECOND * sample.dt), velocity)
         return Seen(velocity, self._variance(velocity, roll, pitch))
 
     def model(self, measured: Seen) -> Measurement:
         C = np.zeros((2, SIZE))
         C[:, VELOCITY] = self._f.attitude.rot.T[:2]
         return Measurement(measured.velocity, C, np.full(2, measured.variance))
+
+    def _tell_attitude(self, time_us: int, across: Array) -> None:
+        """Tell the velocity that was seen (2,), along the line of sight that of the estimate."""
+        f = self._f
+        velocity = f.attitude.rot.T @ f.x[VELOCITY]
+        velocity[:2] = across
+        f.attitude.push_flow(time_us, f.attitude.rot @ velocity)
 
     def _unusable(self, sample: FlowSample, roll: float, pitch: float) -> str:
         f = self._f
