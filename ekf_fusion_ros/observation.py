@@ -17,8 +17,8 @@ class Observation:
     def __init__(self, name: str, size: int = 1) -> None:
         """Start with zeros, as a sensor that was never tried."""
         self.name = name
-        self.innovation = [0.0] * size
-        self.variance = [0.0] * size
+        self.innovation: Sequence[float] = (0.0,) * size
+        self.variance: Sequence[float] = (0.0,) * size
         self.test_ratio = 0.0
         self.rejected_last = False
         self.time_us = 0
@@ -31,48 +31,30 @@ class Observation:
         self.stops = 0
         self._active = False
 
-    def record(
+    def note(
         self, time_us: int, innovation: Sequence[float], variance: Sequence[float],
-        test_ratio: float,
-    ) -> None:
-        """Take down an attempt before its outcome is known."""
+        test_ratio: float, passed: bool,
+    ) -> bool:
+        """Take down an attempt, counted as fused where it has passed; return that."""
         self.time_us = time_us
         self.judged += 1
-        self.innovation[:] = innovation
-        self.variance[:] = variance
+        self.innovation = innovation
+        self.variance = variance
         self.test_ratio = test_ratio
-
-    def judge(
-        self, time_us: int, innovation: Sequence[float], variance: Sequence[float],
-        test_ratio: float, largest: float = 1.0,
-    ) -> bool:
-        """Take down an attempt; True, and counted as fused, where its ratio is not too large."""
-        self.record(time_us, innovation, variance, test_ratio)
-        if test_ratio <= largest:
-            self.accept()
-            return True
-        self.reject()
-        return False
-
-    def accept(self) -> None:
-        """Count the attempt as fused."""
-        self.rejected_last = False
-        self.fused += 1
-        self.last_fused_us = self.time_us
-        if self.first_fused_us == 0:
-            self.first_fused_us = self.time_us
-
-    def reject(self) -> None:
-        """Count the attempt as rejected."""
-        self.rejected_last = True
-        self.rejected += 1
+        self.rejected_last = not passed
+        if passed:
+            self.fused += 1
+            self.last_fused_us = time_us
+            if self.first_fused_us == 0:
+                self.first_fused_us = time_us
+        else:
+            self.rejected += 1
+        return passed
 
     def clear(self, time_us: int) -> None:
         """Forget the innovation of a source that has stopped."""
-        size = len(self.innovation)
         self.time_us = time_us
-        self.innovation[:] = [0.0] * size
-        self.variance[:] = [0.0] * size
+        self.innovation = self.variance = (0.0,) * len(self.innovation)
         self.test_ratio = 0.0
 
     def note_active(self, active: bool) -> None:

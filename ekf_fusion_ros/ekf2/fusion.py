@@ -20,7 +20,7 @@ def fuse_horizontal_velocity(
 ) -> bool:
     """Gate and fuse NE velocity; innovation in m/s, noise variances in (m/s)^2."""
     north, east, ratio, faults = f.cov.fuse_two_states(f.x, VN, innovation, noise, gate, 1.0)
-    passed = record.judge(f.t_now, innovation, (north, east), ratio)
+    passed = record.note(f.t_now, innovation, (north, east), ratio, ratio <= 1.0)
     f.rejections.hor_vel = not passed
     if passed:
         f.times.hor_vel = f.t_now
@@ -38,7 +38,8 @@ def fuse_horizontal_position(
     """
     north, east, ratio, faults = f.cov.fuse_two_states(
         f.x, PN, innovation, noise, gate, enforce_up_to)
-    passed = record.judge(f.t_now, innovation, (north, east), ratio, enforce_up_to)
+    passed = record.note(
+        f.t_now, innovation, (north, east), ratio, ratio <= enforce_up_to)
     f.rejections.hor_pos = not passed
     if passed:
         f.times.hor_pos = f.t_now
@@ -52,7 +53,7 @@ def fuse_vertical_velocity(
     """Gate and fuse down velocity; innovation in m/s, noise variance in (m/s)^2."""
     variance, ratio, healthy = f.cov.fuse_state(f.x, VD, innovation, noise, gate)
     f.ver_vel_check = VerticalCheck(innovation / math.sqrt(variance), f.t_now)
-    passed = record.judge(f.t_now, (innovation,), (variance,), ratio)
+    passed = record.note(f.t_now, (innovation,), (variance,), ratio, ratio <= 1.0)
     f.rejections.ver_vel = not passed
     if passed:
         f.times.ver_vel = f.t_now
@@ -66,7 +67,7 @@ def fuse_vertical_position(
     """Gate and fuse down position; innovation in m, noise variance in m^2."""
     variance, ratio, healthy = f.cov.fuse_state(f.x, PD, innovation, noise, gate)
     f.ver_pos_check = VerticalCheck(innovation / math.sqrt(variance), f.t_now)
-    passed = record.judge(f.t_now, (innovation,), (variance,), ratio)
+    passed = record.note(f.t_now, (innovation,), (variance,), ratio, ratio <= 1.0)
     f.rejections.ver_pos = not passed
     f.rejections.mag_judged_after_height = False
     if passed:

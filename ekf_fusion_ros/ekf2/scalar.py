@@ -17,7 +17,7 @@ def passes(
 ) -> bool:
     """Take an attempt down in its record; True, and counted as fused, where it passes its gate."""
     ratio = test_ratio(innovation, variance, gate)
-    return record.judge(f.t_now, (innovation,), (variance,), ratio)
+    return record.note(f.t_now, (innovation,), (variance,), ratio, ratio <= 1.0)
 
 
 def fuse_scalar(

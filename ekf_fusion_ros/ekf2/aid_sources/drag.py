@@ -103,13 +103,9 @@ class Drag:
         if variance < noise:
             return False
         innovation = predicted - measured
-        record.innovation[axis], record.variance[axis] = innovation, variance
-        record.test_ratio = test_ratio(innovation, variance, GATE)
-        record.time_us = f.t_now
-        record.judged += 1
-        if record.test_ratio > 1.0:
-            record.reject()
-        else:
-            record.accept()
+        innovations, variances = list(record.innovation), list(record.variance)
+        innovations[axis], variances[axis] = innovation, variance
+        ratio = test_ratio(innovation, variance, GATE)
+        if record.note(f.t_now, innovations, variances, ratio, ratio <= 1.0):
             fuse_scalar(f, self._hp, variance, innovation, wind_only=True)
         return True

@@ -139,18 +139,12 @@ class GnssYaw:
         f = self._f
         gate = max(f.params.mag.heading_gate, 1.0)
         record = f.observations.yaw
-        record.record(f.t_now, (innovation,), (variance,),
-                      test_ratio(innovation, variance, gate))
+        ratio = test_ratio(innovation, variance, gate)
         f.observations.mag.test_ratio = 0.0
-        f.rejections.yaw = record.test_ratio > 1.0
-        if not f.rejections.yaw:
-            record.accept()
-            return innovation, False
-        if f.flags.in_air:
-            record.reject()
-            return innovation, True
-        limit = gate * math.sqrt(variance)
-        innovation = min(max(innovation, -limit), limit)
-        record.accept()
-        record.innovation[0] = innovation
-        return innovation, False
+        f.rejections.yaw = ratio > 1.0
+        refused = f.rejections.yaw and f.flags.in_air
+        if f.rejections.yaw and not refused:
+            limit = gate * math.sqrt(variance)
+            innovation = min(max(innovation, -limit), limit)
+        record.note(f.t_now, (innovation,), (variance,), ratio, not refused)
+        return innovation, refused

@@ -63,7 +63,7 @@ class OpticalFlow:
         self._popped: tuple[int, FlowSample] | None = None
         self._popped_us = 0
         self._sample: Compensated | None = None
-        self._for_terrain = False
+        self.for_terrain = False
         self._h = np.zeros((2, 24))
         self._hp = np.zeros((2, 24))
 
@@ -83,10 +83,10 @@ class OpticalFlow:
         if self._popped is None:
             return
         self._popped_us = self._popped[0]
-        if f.flags.in_air and not self._for_terrain:
+        if f.flags.in_air and not self.for_terrain:
             range_is_silent = f.late(f.times.hagl, TERRAIN_NEEDS_FLOW_US)
             gnss_alone = f.flags.gps and not f.flags.opt_flow
-            self._for_terrain = range_is_silent and gnss_alone
+            self.for_terrain = range_is_silent and gnss_alone
 
     def step(self) -> None:
         """Run once per filter period."""
@@ -120,7 +120,7 @@ class OpticalFlow:
             dt = sample.dt if dt_fits else shortest
             self._sample = Compensated((0.0, 0.0), gyro, dt, sample.quality)
             return True
-        self._for_terrain = False
+        self.for_terrain = False
         return False
 
     def _rate(self, sample: Compensated) -> tuple[float, float]:
@@ -236,14 +236,9 @@ class OpticalFlow:
         f = self._f
         record, rejections = f.observations.flow, f.rejections
         ratios = [test_ratio(i, s, gate) for i, s in zip(innovation, variance, strict=True)]
-        record.record(f.t_now, innovation, variance, max(ratios))
         rejections.flow_x, rejections.flow_y = (ratio > 1.0 for ratio in ratios)
         rejections.flow_judged_after_hagl = True
-        if record.test_ratio > 1.0:
-            record.reject()
-            return False
-        record.accept()
-        return True
+        return record.note(f.t_now, innovation, variance, max(ratios), max(ratios) <= 1.0)
 
     def _apply(self, innovation: tuple[float, float], variance: tuple[float, float]) -> None:
         f = self._f
@@ -266,19 +261,17 @@ class OpticalFlow:
 
     def aid_terrain(self) -> None:
         """Fuse a sample that the range finder's silence has left to the terrain."""
-        if not self._for_terrain:
-            return
         f = self._f
         if not f.flags.in_air or not f.params.terrain.use_flow or self._sample is None:
             return
-        self._for_terrain = False
+        self.for_terrain = False
         sample = self._sample
         rot = matrix_from_quat(f.x[0:4])
         innovation, variance = self._terrain.fuse_flow(
             self._rate(sample), self._body_velocity(sample, rot), float(rot[2, 2]),
             self._noise(sample.quality), f.params.flow.gate)
-        f.observations.flow.innovation[:] = innovation
-        f.observations.flow.variance[:] = variance
+        f.observations.flow.innovation = innovation
+        f.observations.flow.variance = variance
 
     # ---- reset ----
 

@@ -39,8 +39,9 @@ def fuse_body_velocity(
     The axes forward and right are judged together, down by itself.
     """
     innovation, variance, ratio, faults = f.cov.fuse_body_velocity(f.x, measured, noise, gate)
-    level = horizontal.judge(f.t_now, innovation[0:2], variance[0:2], max(ratio[0:2]))
-    down = vertical.judge(f.t_now, innovation[2:3], variance[2:3], ratio[2])
+    worst = max(ratio[0:2])
+    level = horizontal.note(f.t_now, innovation[0:2], variance[0:2], worst, worst <= 1.0)
+    down = vertical.note(f.t_now, innovation[2:3], variance[2:3], ratio[2], ratio[2] <= 1.0)
     f.rejections.hor_vel, f.rejections.ver_vel = not level, not down
     if level:
         f.times.hor_vel = f.t_now

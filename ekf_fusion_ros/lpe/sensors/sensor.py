@@ -117,14 +117,12 @@ class Sensor(ABC):
             return
         innovation = innovation_of(f.x, f.P, m)
         ratio = innovation.ratio / self.tolerance
-        self.observation.record(f.now_us, [-r for r in innovation.residual.tolist()],
-                                innovation.S.diagonal().tolist(), ratio)
         self._note_fault(ratio > 1.0)
-        if self.faulty and self.drops_faulty:
-            self.observation.reject()
-            return
-        f.correct(m.C, innovation)
-        self.observation.accept()
+        used = not (self.faulty and self.drops_faulty)
+        self.observation.note(f.now_us, [-r for r in innovation.residual.tolist()],
+                              innovation.S.diagonal().tolist(), ratio, used)
+        if used:
+            f.correct(m.C, innovation)
 
     def _note_fault(self, faulty: bool) -> None:
         if faulty != self.faulty:
