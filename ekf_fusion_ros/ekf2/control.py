@@ -110,12 +110,13 @@ class Control:
 
     def _take_samples(self) -> None:
         """Take what the horizon has passed, after judging whether sensors still deliver."""
-        self.gnss.check_arrival()
         self.baro.check_arrival()
         horizon_us = self._f.t_horizon
         for source in self._sampled:
-            if source.popped or source.buffer.next_us <= horizon_us:
+            if source.buffer.next_us <= horizon_us:
                 source.pop()
+            else:
+                source.popped = False
         self.range.pop()
         self.flow.pop()
         self.airspeed.pop()
@@ -169,7 +170,9 @@ class Control:
     def correct_bank(self) -> None:
         """Let the yaw bank use its velocity, and offer it that of a new fix for the next step."""
         f = self._f
-        self.bank.correct(f.imu.increments, f.flags.in_air, f.x, f.dt_avg)
+        in_air = f.flags.in_air
+        if self.bank.pending or not in_air:
+            self.bank.correct(f.imu.increments, in_air, f.x, f.dt_avg)
         fix = f.fix
         if self.gnss.popped and fix is not None and fix.has_velocity and fix.vacc > 0.0:
             self.bank.set_velocity(fix.velocity, fix.vacc)

@@ -116,12 +116,13 @@ class Ekf2:
                 self.update()
             self._raw = sample
             self.inertial.started = True
-        elif type(sample) not in self._queues:
+            return
+        queue = self._queues.get(type(sample))
+        if queue is None:
             raise TypeError(f'{type(sample).__name__}: expected one of '
                             + ', '.join(kind.__name__ for kind in (ImuSample, *self._queues)))
-        elif self.inertial.started:
-            sample = admitted(sample)
-            self._queues[type(sample)](sample, self.inertial.min_interval_us)
+        if self.inertial.started:
+            queue(admitted(sample), self.inertial.min_interval_us)
         else:
             self._too_early[type(sample)] += 1
 
@@ -139,7 +140,6 @@ class Ekf2:
         f.t_now = raw.time_us
         if not complete and self.initialised:
             return False
-        f.dt_imu_avg = inertial.dt_avg
         f.flags.vehicle_at_rest = inertial.at_rest and not self._ground_contact.moves_evenly()
         if complete:
             f.t_horizon = inertial.ring[0].time_us
@@ -164,7 +164,7 @@ class Ekf2:
         if complete:
             self._advance()
         else:
-            f.output.propagate(self.inertial.raw, f.x, f.dt_imu_avg, f.dt_avg)
+            f.output.propagate(self.inertial.state, f.x, f.dt_avg)
         return complete
 
     def _advance(self) -> None:
@@ -175,7 +175,8 @@ class Ekf2:
         control = self.control
         control.step()
         delay = 1e-6 * (f.t_now - f.t_horizon)
-        f.output.finish_period(self.inertial.raw, f, delay, control.bank, control.bank_airspeed())
+        f.output.finish_period(
+            self.inertial.state, f, delay, control.bank, control.bank_airspeed())
         control.correct_bank()
 
     def _predict(self) -> None:

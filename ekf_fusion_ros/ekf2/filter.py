@@ -111,7 +111,6 @@ class Filter:
         self.imu = DelayedImu(0, np.zeros(8), NO_CLIPPING)
         self.t_now = 0
         self.t_horizon = 0
-        self.dt_imu_avg = 0.0
         self.dt_avg = FILTER_PERIOD
         self.accel_lpf = self.cov.accel_lpf
         self.travel = self.cov.travel

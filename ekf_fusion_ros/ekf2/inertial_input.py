@@ -30,7 +30,7 @@ RATE_LIMIT = 0.05
 class InertialInput:
     """The ring of filter periods between now and the fusion horizon.
 
-    `raw` (8,) is the newest raw sample: delta angle, delta velocity, both intervals;
+    `state` is one INERTIAL, with the newest raw sample in it;
     `at_rest` where nothing has moved for a while, `quiet` where neither vibration nor rotation has
     shown: both as of the last complete period.
     """
@@ -43,16 +43,14 @@ class InertialInput:
         self.min_interval_us = 0
         self.at_rest = False
         self.quiet = False
-        self._state = np.zeros(1, INERTIAL)
-        state = self._state[0]
+        self.state = np.zeros(1, INERTIAL)
+        state = self.state[0]
         state['quat'][0] = 1.0
         state['limits'] = moving_scaler * np.array(
             (ANGLE_VIBRATION_LIMIT, VELOCITY_VIBRATION_LIMIT, RATE_LIMIT))
         self.vibration = state['vibration']
-        self._mean_dt = state['mean_dt']
         self._times = state['times']
         self._period = state['period']
-        self.raw: Array = state['raw']
         self._clipping = NO_CLIPPING
         self._take_raw = machine_code(take_raw)
 
@@ -65,7 +63,7 @@ class InertialInput:
         """
         time_us, angle, velocity, angle_dt, velocity_dt, clipping, _ = sample
         outcome = self._take_raw(
-            self._state, output.state, x, time_us, angle, velocity, angle_dt, velocity_dt, dt_avg,
+            self.state, output.state, x, time_us, angle, velocity, angle_dt, velocity_dt, dt_avg,
             in_air)
         if outcome == NOT_FINITE:
             raise not_finite(sample)
@@ -83,12 +81,6 @@ class InertialInput:
         self.quiet = last - vibration > REST_TIME_US
         self.min_interval_us = (time_us - self.ring[0].time_us) // (self._observation_length - 1)
         return True
-
-    @property
-    def dt_avg(self) -> float:
-        """Mean interval of raw samples in s."""
-        mean: float = self._mean_dt.item(0)
-        return mean
 
 
 def buffer_lengths(

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from ekf_fusion_ros.ekf2.yaw_estimator import YawEstimator
 
 Array = NDArray[np.float64]
+Record = NDArray[np.void]
 
 
 class OutputPredictor:
@@ -53,19 +54,20 @@ class OutputPredictor:
         self.now[:] = x[0:10]
         self.state['running'] = True
 
-    def propagate(self, raw: Array, x: Array, dt_imu_avg: float, dt_avg: float) -> None:
-        """Advance by one raw sample (8,) that completes no filter period."""
-        propagate_predictor(self.state, raw, x, dt_imu_avg / dt_avg)
+    def propagate(self, inertial: Record, x: Array, dt_avg: float) -> None:
+        """Advance by the raw sample of one INERTIAL, which completes no filter period."""
+        newest = inertial[0]
+        propagate_predictor(self.state, newest['raw'], x, newest['mean_dt'].item(0) / dt_avg)
 
     def finish_period(
-        self, raw: Array, f: Filter, delay: float, bank: YawEstimator, airspeed: float,
+        self, inertial: Record, f: Filter, delay: float, bank: YawEstimator, airspeed: float,
     ) -> None:
-        """Advance by the raw sample (8,) that completes a period, and compare with the filter.
+        """Advance by the raw sample of one INERTIAL, which completes a period, and compare.
 
         The state of the filter lies `delay` s in the past. The yaw bank advances by the period at
         the horizon; airspeed m/s, 0 = unknown.
         """
-        self._finish_period(self.state, self._history, f.x, raw, f.dt_imu_avg, f.dt_avg, delay,
+        self._finish_period(inertial, self.state, self._history, f.x, f.dt_avg, delay,
                             bank.models, f.imu.increments, airspeed)
 
     def navigation(self, x: Array, p: Array, dt_avg: float) -> Array:

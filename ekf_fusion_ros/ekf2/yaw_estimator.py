@@ -20,6 +20,7 @@ from ekf_fusion_ros.mathlib.rotation import with_yaw
 Array = NDArray[np.float64]
 
 WEIGHT_FLOOR = 1e-5
+UNKNOWN_YAW = 0.0, (0.5 * math.pi) ** 2
 FORCE_MIN, FORCE_MAX = 0.9 * GRAVITY, 1.1 * GRAVITY
 """Specific force in m/s^2 between which gravity tells the tilt."""
 
@@ -28,7 +29,7 @@ class YawEstimator:
     """Five attitude references with evenly spaced yaw, each with a 3-state velocity-yaw EKF.
 
     Their weights follow the likelihood of the velocity innovations; yaw and variance are those of
-    the weighted sum.
+    the weighted sum. `pending`: in flight, too, `correct` has something to do.
     """
 
     def __init__(self) -> None:
@@ -42,22 +43,23 @@ class YawEstimator:
         self.cov: Array = models['cov']
         self.weights: Array = models['weights']
         self.weights[:] = 1.0 / MODELS
-        self._composite: Array = models['composite']
-        self._composite[1] = (0.5 * math.pi) ** 2
         self._accel: Array = models['accel']
         self._tilt_aligned = False
         self._running = False
+        self.pending = True
         self._velocity: Array | None = None
         self._accuracy = 0.0
 
     def restart(self) -> None:
         """Find tilt and yaw anew."""
         self._tilt_aligned = False
+        self.pending = True
         self.models['tilt_aligned'] = False
         self._run(False)
 
     def set_velocity(self, velocity: Array, accuracy: float) -> None:
         """Offer a NE velocity (2,) and its 1-sigma accuracy, m/s, to the next step."""
+        self.pending = True
         self._velocity = velocity[0:2].copy()
         self._accuracy = accuracy
 
@@ -75,14 +77,13 @@ class YawEstimator:
         if not self._tilt_aligned:
             self._align_tilt(imu)
             return
+        self.pending = False
         velocity, self._velocity = self._velocity, None
         if not airborne:
             if self._running:
                 self._run(False)
         elif velocity is not None:
             self._use(velocity, x[10:13] / dt)
-            if self._running:
-                combine_models(self.state, self.cov, self.weights, self._composite)
 
     @property
     def running(self) -> bool:
@@ -96,12 +97,18 @@ class YawEstimator:
     @property
     def yaw(self) -> float:
         """Yaw of the weighted sum in rad."""
-        return float(self._composite[0])
+        return self._combined()[0]
 
     @property
     def variance(self) -> float:
         """Variance of the weighted sum in rad^2."""
-        return float(self._composite[1])
+        return self._combined()[1]
+
+    def _combined(self) -> tuple[float, float]:
+        if not self._running:
+            return UNKNOWN_YAW
+        combined: tuple[float, float] = combine_models(self.state, self.cov, self.weights)
+        return combined
 
     def _align_tilt(self, imu: Array) -> None:
         delta_velocity, dt = imu[3:6], max(float(imu[7]), 1e-3)

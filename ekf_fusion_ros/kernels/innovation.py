@@ -5,13 +5,31 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ekf_fusion_ros.kernels.compile import COMPILED
 from ekf_fusion_ros.kernels.compile import kernel
 
 Array = NDArray[np.float64]
 
 
 @kernel
-def project(p: Array, h: Array, hp: Array) -> float:
-    """Fill hp (24,) with H P and return H P H' for a Jacobian h (24,) and a symmetric P."""
+def _project_by_element(p: Array, h: Array, hp: Array) -> float:
+    hp[:] = 0.0
+    for i in range(24):
+        slope = h[i]
+        if slope != 0.0:
+            for j in range(24):
+                hp[j] += slope * p[i, j]
+    variance = 0.0
+    for i in range(24):
+        variance += hp[i] * h[i]
+    return variance
+
+
+def _project_as_arrays(p: Array, h: Array, hp: Array) -> float:
     np.dot(h, p, hp)
     return float(np.dot(hp, h))
+
+
+project = _project_by_element if COMPILED else _project_as_arrays
+"""Fill hp (24,) with H P and return H P H' for a Jacobian h (24,) and a symmetric P (24, 24).
+Most of a Jacobian is zero."""

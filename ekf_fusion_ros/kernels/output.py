@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ekf_fusion_ros.kernels.compile import COMPILED
 from ekf_fusion_ros.kernels.compile import four
 from ekf_fusion_ros.kernels.compile import kernel
 from ekf_fusion_ros.kernels.compile import three
@@ -121,6 +122,21 @@ def attitude_error(q: Array, oldest: Array) -> tuple[float, float, float]:
 
 
 @kernel
+def _shift_by_element(history: Array, shift: Array) -> None:
+    for k in range(history.shape[0]):
+        for i in range(6):
+            history[k, 4 + i] += shift[i]
+
+
+def _shift_as_arrays(history: Array, shift: Array) -> None:
+    history[:, 4:10] += shift
+
+
+shift_history = _shift_by_element if COMPILED else _shift_as_arrays
+"""Move velocity and position of a history (n, 10) by a shift (6,)."""
+
+
+@kernel
 def correct_output(
     out: Array, history: Array, oldest: int, x: Array, integral: Array, att_gain: float,
     vel_gain: float, pos_gain: float, correction: Array, errors: Array,
@@ -134,14 +150,14 @@ def correct_output(
     e0, e1, e2 = attitude_error(x, history[oldest])
     correction[0], correction[1], correction[2] = e0 * att_gain, e1 * att_gain, e2 * att_gain
     errors[0] = length(e0, e1, e2)
-    difference = x[4:10] - history[oldest, 4:10]
-    integral += difference
-    shift = np.empty(6)
+    difference, shift = np.empty(6), np.empty(6)
     for i in range(6):
         gain = vel_gain if i < 3 else pos_gain
+        difference[i] = x[4 + i] - history[oldest, 4 + i]
+        integral[i] += difference[i]
         shift[i] = difference[i] * gain + integral[i] * (gain * gain * 0.1)
-    history[:, 4:10] += shift
-    out[4:10] += shift
+        out[4 + i] += shift[i]
+    shift_history(history, shift)
     d0, d1, d2 = three(difference)
     errors[1] = length(d0, d1, d2)
     d0, d1, d2 = three(difference[3:6])

@@ -110,14 +110,15 @@ def select_accel_biases(
 
 @kernel
 def finish_period(
-    output: Record, history: Array, x: Array, raw: Array, dt_imu_avg: float, dt_avg: float,
-    delay: float, bank: Record, imu: Array, airspeed: float,
+    inertial: Record, output: Record, history: Array, x: Array, dt_avg: float, delay: float,
+    bank: Record, imu: Array, airspeed: float,
 ) -> None:
-    """Carry the output over the raw sample (8,) that completed the period and correct it.
+    """Carry the output over the raw sample of one INERTIAL that completed the period.
 
-    See correct_predictor. The models of the yaw bank, one BANK, advance over the period imu (8,)
-    at the horizon.
+    Then correct it, see correct_predictor. The models of the yaw bank, one BANK, advance over the
+    period imu (8,) at the horizon.
     """
+    raw, dt_imu_avg = inertial[0]['raw'], inertial[0]['mean_dt'][0]
     propagate_predictor(output, raw, x, dt_imu_avg / dt_avg)
     correct_predictor(output, history, x, dt_imu_avg, dt_avg, delay)
     advance_bank(bank, imu, airspeed)

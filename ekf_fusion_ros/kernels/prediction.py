@@ -223,6 +223,25 @@ variances are angle_var rad^2 and velocity_var (3,) (m/s)^2."""
 
 
 @kernel
+def _replace_top_by_element(p: Array, top: Array, block: Array) -> None:
+    for i in range(10):
+        for j in range(10):
+            p[i, j] = block[i, j]
+        for j in range(10, 24):
+            p[i, j] = p[j, i] = top[i, j]
+
+
+def _replace_top_as_arrays(p: Array, top: Array, block: Array) -> None:
+    p[0:10, 0:10] = block
+    p[0:10, 10:24] = top[:, 10:24]
+    p[10:24, 0:10] = top[:, 10:24].T
+
+
+replace_top = _replace_top_by_element if COMPILED else _replace_top_as_arrays
+"""Write the block (10, 10) and what the first states share with the others, top (10, 24), to P."""
+
+
+@kernel
 def advance_covariance(
     p: Array, x: Array, imu: Array, limits: Array, process: NDArray[np.void], dt_avg: float,
 ) -> None:
@@ -253,8 +272,11 @@ def advance_covariance(
 @kernel
 def add_yaw_variance(p: Array, x: Array, variance: float) -> None:
     """Add variance in rad^2 about the earth's vertical to the attitude of x (24,)."""
-    direction = 0.5 * np.array((-x[3], -x[2], x[1], x[0]))
-    p[0:4, 0:4] += variance * np.outer(direction, direction)
+    q0, q1, q2, q3 = four(x)
+    direction = (-0.5 * q3, -0.5 * q2, 0.5 * q1, 0.5 * q0)
+    for i in range(4):
+        for j in range(4):
+            p[i, j] += variance * (direction[i] * direction[j])
 
 
 @kernel
@@ -277,9 +299,7 @@ def predict_covariance(
         top[7:9, 10:24] = p[7:9, 10:24]
         block[7:9, :] = p[7:9, 0:10]
         block[:, 7:9] = p[0:10, 7:9]
-    p[0:10, 0:10] = block
-    p[0:10, 10:24] = top[:, 10:24]
-    p[10:24, 0:10] = top[:, 10:24].T
+    replace_top(p, top, block)
     for i in range(7, 16):
         p[i, i] += noise[i]
     if limits[MAG_ACTIVE] != 0.0:

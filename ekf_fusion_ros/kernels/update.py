@@ -37,8 +37,8 @@ def _subtract_by_element(p: Array, gain: Array, hp: Array) -> bool:
             return False
     for i in range(24):
         half_gain, half_hp = 0.5 * gain[i], 0.5 * hp[i]
-        for j in range(24):
-            p[i, j] -= half_gain * hp[j] + half_hp * gain[j]
+        for j in range(i + 1):
+            p[i, j] = p[j, i] = p[i, j] - (half_gain * hp[j] + half_hp * gain[j])
     return True
 
 
@@ -52,7 +52,7 @@ def _subtract_as_arrays(p: Array, gain: Array, hp: Array) -> bool:
 
 subtract = _subtract_by_element if COMPILED else _subtract_as_arrays
 """P <- P - K H P with the halves averaged, for gain (24,) and H P (24,); False, and nothing done,
-where a variance would turn negative. P stays as symmetric as it was, to the last bit."""
+where a variance would turn negative. P is and stays symmetric, to the last bit."""
 
 
 @kernel

@@ -33,14 +33,14 @@ MODELS = 5
 BANK = np.dtype([
     ('rot', 'f8', (MODELS, 3, 3)), ('bias', 'f8', (MODELS, 3)), ('state', 'f8', (MODELS, 3)),
     ('cov', 'f8', (MODELS, 3, 3)), ('weights', 'f8', (MODELS,)), ('accel', 'f8', (3,)),
-    ('composite', 'f8', (2,)), ('tilt_aligned', 'f8'), ('running', 'f8')])
-"""The models, the low-passed specific force in m/s^2, yaw and variance of the sum, whether the
-references have found the tilt, and whether the filters run."""
+    ('tilt_aligned', 'f8'), ('running', 'f8')])
+"""The models, the low-passed specific force in m/s^2, whether the references have found the tilt,
+and whether the filters run."""
 
 
 @kernel
 def advance_bank(bank: NDArray[np.void], imu: Array, airspeed: float) -> None:
-    """Advance every model of one BANK over imu (8,) and combine them, in place.
+    """Advance every model of one BANK over imu (8,), in place.
 
     Nothing is done before the tilt is known.
     """
@@ -61,21 +61,21 @@ def advance_bank(bank: NDArray[np.void], imu: Array, airspeed: float) -> None:
     predict_attitudes(rot, s['bias'], imu, accel, TILT_GAIN * (1.0 - excess) ** 2, airspeed)
     if s['running'] != 0.0:
         predict_models(rot, s['state'], s['cov'], imu)
-        combine_models(s['state'], s['cov'], s['weights'], s['composite'])
 
 
 @kernel
-def combine_models(state: Array, cov: Array, weights: Array, out: Array) -> None:
-    """Fill out (2,) with yaw in rad and its variance in rad^2 of the weighted sum."""
+def combine_models(state: Array, cov: Array, weights: Array) -> tuple[float, float]:
+    """Return yaw in rad and its variance in rad^2 of the weighted sum."""
     north = east = 0.0
     for m in range(weights.shape[0]):
         north += weights[m] * math.cos(state[m, 2])
         east += weights[m] * math.sin(state[m, 2])
-    out[0] = math.atan2(east, north)
-    out[1] = 0.0
+    yaw = math.atan2(east, north)
+    variance = 0.0
     for m in range(weights.shape[0]):
-        spread = (state[m, 2] - out[0] + math.pi) % (2.0 * math.pi) - math.pi
-        out[1] += weights[m] * (cov[m, 2, 2] + spread * spread)
+        spread = (state[m, 2] - yaw + math.pi) % (2.0 * math.pi) - math.pi
+        variance += weights[m] * (cov[m, 2, 2] + spread * spread)
+    return yaw, variance
 
 
 @kernel

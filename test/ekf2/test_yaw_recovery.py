@@ -28,7 +28,10 @@ class Bank(YawEstimator):
     def __init__(self, yaw_deg, sigma_deg, running=True):
         super().__init__()
         self.models['running'] = self._running = running
-        self._composite[:] = math.radians(yaw_deg), math.radians(sigma_deg) ** 2
+        self._told = math.radians(yaw_deg), math.radians(sigma_deg) ** 2
+
+    def _combined(self):
+        return self._told
 
 
 def recovery(bank, *, own_sigma_deg=1.0, thorough=True):

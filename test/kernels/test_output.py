@@ -14,6 +14,7 @@ import pytest
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.output_predictor import OutputPredictor
 from ekf_fusion_ros.ekf2.yaw_estimator import YawEstimator
+from ekf_fusion_ros.kernels.inertial import INERTIAL
 from ekf_fusion_ros.kernels.output import attitude_error
 from ekf_fusion_ros.kernels.output import propagate_output
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
@@ -61,15 +62,17 @@ def test_attitude_error_takes_the_output_to_the_filter(q, error):
 def test_an_error_of_the_output_dies_out_with_the_time_constants():
     params = OutputParams(vel_tau=0.25, pos_tau=0.25)
     predictor, f, bank = OutputPredictor(params, 12), Filter(Ekf2Params(), 12), YawEstimator()
-    x, f.dt_imu_avg, f.dt_avg = f.x, DT, 2.0 * DT
+    x, f.dt_avg = f.x, 2.0 * DT
     predictor.align(x)
     predictor.now[4:10] = (1.0, -1.0, 0.5, 2.0, -3.0, 1.0)
     predictor.now[0:4] = (np.cos(0.05), 0.0, 0.0, np.sin(0.05))
-    at_rest = np.array((0.0, 0.0, 0.0, 0.0, 0.0, -9.80665 * DT, DT, DT))
+    at_rest = np.zeros(1, INERTIAL)
+    at_rest[0]['raw'] = 0.0, 0.0, 0.0, 0.0, 0.0, -9.80665 * DT, DT, DT
+    at_rest[0]['mean_dt'] = DT
     sizes = []
     for k in range(4000):
         if k % 2 == 0:
-            predictor.propagate(at_rest, x, DT, 2.0 * DT)
+            predictor.propagate(at_rest, x, 2.0 * DT)
         else:
             predictor.finish_period(at_rest, f, 0.11, bank, 0.0)
             sizes.append(np.abs(predictor.now[4:10]).max())

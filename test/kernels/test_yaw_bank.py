@@ -91,10 +91,9 @@ def test_yaw_of_the_sum_is_a_circular_mean():
     yaw = np.radians((170.0, -170.0, 175.0))
     state = np.column_stack([np.zeros((3, 2)), yaw])
     cov = np.tile(np.diag((1.0, 1.0, 0.01)), (3, 1, 1))
-    out = np.empty(2)
-    combine_models(state, cov, np.array((0.5, 0.5, 0.0)), out)
-    assert abs(out[0]) == pytest.approx(math.pi)
-    assert out[1] == pytest.approx(0.01 + math.radians(10.0) ** 2)
+    found, variance = combine_models(state, cov, np.array((0.5, 0.5, 0.0)))
+    assert abs(found) == pytest.approx(math.pi)
+    assert variance == pytest.approx(0.01 + math.radians(10.0) ** 2)
 
 
 def test_attitudes_turn_with_the_gyros():
