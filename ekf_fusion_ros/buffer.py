@@ -68,16 +68,17 @@ class SampleBuffer(Generic[T]):
         if self.next_us > time_us:
             return None
         waiting = self._waiting
-        for index in range(len(waiting) - 1, -1, -1):
-            stamp, sample = waiting[index]
-            if stamp <= time_us < stamp + MAX_AGE_US:
-                for _ in range(index):
-                    waiting.popleft()
-                    self.passed_over[OVERTAKEN] += 1
-                waiting.popleft()
-                if waiting:
-                    self.next_us = waiting[0][0]
-                else:
-                    self.next_us, self.newest_time_us = NEVER, 0
-                return stamp, sample
-        return None
+        passed, count = 1, len(waiting)
+        while passed < count and waiting[passed][0] <= time_us:
+            passed += 1
+        if time_us >= waiting[passed - 1][0] + MAX_AGE_US:
+            return None
+        for _ in range(passed - 1):
+            waiting.popleft()
+            self.passed_over[OVERTAKEN] += 1
+        newest_passed = waiting.popleft()
+        if waiting:
+            self.next_us = waiting[0][0]
+        else:
+            self.next_us, self.newest_time_us = NEVER, 0
+        return newest_passed

@@ -59,8 +59,10 @@ def _places(
 
 
 _MEASURED, _PERHAPS = _places(MEASURED), _places(PERHAPS_MEASURED)
-_NUMBERS = {kind: tuple(kind._fields.index(name) for name in names)
-            for kind, names in NUMBERS.items()}
+_CHECKS = {kind: (_MEASURED.get(kind, ()), _PERHAPS.get(kind, ()),
+                  tuple(kind._fields.index(name) for name in NUMBERS.get(kind, ())))
+           for kind in (*MEASURED, *PERHAPS_MEASURED, *NUMBERS)}
+_NOTHING: tuple[Any, Any, Any] = (), (), ()
 
 
 def admitted_imu(sample: ImuSample) -> ImuSample:
@@ -85,16 +87,16 @@ def admitted(sample: Any) -> Any:
     Raises ValueError, naming type and field, for a wrong shape and for numbers that are not
     finite where they must be.
     """
-    kind = type(sample)
-    for place, shape in _MEASURED.get(kind, ()):
+    must, may, numbers = _CHECKS.get(type(sample), _NOTHING)
+    for place, shape in must:
         value = sample[place]
         # A sum is finite only where all of its terms are.
         if not (_is_plain(value, shape) and math.isfinite(sum(value.tolist()))):
             return _changed(sample)
-    for place, shape in _PERHAPS.get(kind, ()):
+    for place, shape in may:
         if not _is_plain(sample[place], shape):
             return _changed(sample)
-    for place in _NUMBERS.get(kind, ()):
+    for place in numbers:
         if not math.isfinite(sample[place]):
             return _changed(sample)
     return sample

@@ -51,6 +51,8 @@ class Covariance:
         self._fuse_state = machine_code(fuse_state)
         self._fuse_two_states = machine_code(fuse_two_states)
         self._fuse_declination = machine_code(fuse_declination)
+        self._correct_by_field = machine_code(correct_by_field)
+        self._apply_yaw = machine_code(apply_yaw)
         self.inhibited: Array = self.limits[0:3]
         self._saved_ne = np.zeros((2, 2))
         self._saved_d_body = np.zeros(4)
@@ -162,7 +164,8 @@ class Covariance:
         self, x: Array, jacobian: Array, gain: Array, variance: float, innovation: float,
     ) -> bool:
         """Correct with a yaw; see kernels.heading.apply_yaw."""
-        healthy: bool = apply_yaw(self.p, x, jacobian, gain, variance, innovation, self.limits)
+        healthy: bool = self._apply_yaw(
+            self.p, x, jacobian, gain, variance, innovation, self.limits)
         return healthy
 
     def fuse_two_states(
@@ -188,7 +191,7 @@ class Covariance:
         declination: float, shortest: float,
     ) -> tuple[bool, Three, Three, Three, tuple[int, int, int]]:
         """Gate and fuse the first magnetometer axes; see kernels.magnetic.correct_by_field."""
-        outcome: tuple[bool, Three, Three, Three, tuple[int, int, int]] = correct_by_field(
+        outcome: tuple[bool, Three, Three, Three, tuple[int, int, int]] = self._correct_by_field(
             x, self.p, measured, axes, noise, gate, all_states, declination, shortest, self.limits)
         return outcome
 

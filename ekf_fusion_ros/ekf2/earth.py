@@ -17,10 +17,15 @@ from ekf_fusion_ros.geo.projection import make_projection
 Array = NDArray[np.float64]
 EARTH_RATE = 7.292115e-5
 YEAR_US = 365.2425 * 86400e6
+MIN_FIELD = 1e-3
+"""Horizontal field in Gauss that is plausible anywhere."""
 
 
 class EarthReference:
-    """Origin of the local frame and what a latitude and longitude tell."""
+    """Origin of the local frame and what a latitude and longitude tell.
+
+    `shortest_field` is the shortest horizontal field in Gauss that is plausible here.
+    """
 
     def __init__(self, projection: str, field_model: str) -> None:
         """Know nothing yet; projection 'wgs84' or 'sphere', field model 'ecl_table' or 'wmm'."""
@@ -34,6 +39,7 @@ class EarthReference:
         self.alt_ref = 0.0
         self.rate_ned = np.zeros(3)
         self.field: FieldPoint | None = None
+        self.shortest_field = MIN_FIELD
 
     @property
     def has_origin(self) -> bool:
@@ -58,4 +64,5 @@ class EarthReference:
             self._field_model = make_field(self._field_name, 1970.0 + time_us / YEAR_US)
         phi = math.radians(lat)
         self.rate_ned = np.array((EARTH_RATE * math.cos(phi), 0.0, -EARTH_RATE * math.sin(phi)))
-        self.field = self._field_model.lookup(lat, lon)
+        field = self.field = self._field_model.lookup(lat, lon)
+        self.shortest_field = max(MIN_FIELD, 0.5 * field.strength * math.cos(field.inclination))

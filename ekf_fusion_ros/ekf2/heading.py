@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.state import SECOND
+from ekf_fusion_ros.kernels.compile import machine_code
 from ekf_fusion_ros.kernels.heading import compare_headings
 from ekf_fusion_ros.kernels.heading import level_heading
 from ekf_fusion_ros.kernels.heading import observe_yaw
@@ -34,6 +35,8 @@ class HeadingFusion:
         self.covariance_lost = False
         self._jacobian = np.zeros(4)
         self._gain = np.zeros(24)
+        self._compare_headings = machine_code(compare_headings)
+        self._observe_yaw = machine_code(observe_yaw)
 
     def predicted_yaw(self) -> float:
         """Renew the cached rotation and return its yaw by the better sequence, rad."""
@@ -46,7 +49,7 @@ class HeadingFusion:
 
     def fuse_magnetic(self, field: Array, declination: float, noise: float) -> None:
         """Fuse the yaw that a field (3,) in body axes implies; noise in rad^2."""
-        predicted, magnetic = compare_headings(self._f.x, self._f.rot, field)
+        predicted, magnetic = self._compare_headings(self._f.x, self._f.rot, field)
         self._fuse_against(predicted, magnetic + declination, noise)
 
     def _fuse_against(self, predicted: float, measured: float, noise: float) -> None:
@@ -77,7 +80,7 @@ class HeadingFusion:
     def _fuse(self, innovation: float, noise: float) -> None:
         f = self._f
         noise = max(noise, YAW_NOISE_FLOOR)
-        known: float = observe_yaw(f.x, f.rot, f.cov.p, self._jacobian, self._gain)
+        known: float = self._observe_yaw(f.x, f.rot, f.cov.p, self._jacobian, self._gain)
         if math.isnan(known):
             return
         f.faults.heading = known < 0.0
@@ -97,21 +100,19 @@ class HeadingFusion:
         gate = max(f.params.mag.heading_gate, 1.0)
         record = f.observations.yaw
         ratio = innovation * innovation / (gate * gate * variance)
-        record.record(f.t_now, record.innovation, (variance,), ratio)
         f.observations.mag.test_ratio = 0.0
         f.rejections.yaw = ratio > 1.0
         if f.rejections.yaw:
             settled = not f.flags.in_air and f.late(f.last_in_air_us, GROUND_SETTLING_US)
             if not settled:
-                record.reject()
+                record.note(f.t_now, record.innovation, (variance,), ratio, False)
                 return math.nan
             # on the ground the yaw gyro bias is the likeliest cause: open it up, go on clipped
             limit = gate * math.sqrt(variance)
             innovation = min(max(innovation, -limit), limit)
             bias_variance = (f.params.imu.switch_on_gyro_bias * f.dt_avg) ** 2
             f.cov.set_variances(12, np.array((bias_variance,)))
-        record.accept()
-        record.innovation[0] = innovation
+        record.note(f.t_now, (innovation,), (variance,), ratio, True)
         return innovation
 
 

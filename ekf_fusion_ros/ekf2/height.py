@@ -14,6 +14,7 @@ from ekf_fusion_ros.ekf2.gnss_checks import GnssChecks
 from ekf_fusion_ros.ekf2.height_health import VISION_RECENT_US
 from ekf_fusion_ros.ekf2.height_source import HeightSource
 from ekf_fusion_ros.ekf2.range_height import RangeHeight
+from ekf_fusion_ros.ekf2.state import PD
 from ekf_fusion_ros.ekf2.state import SECOND
 
 NO_HEIGHT_NOISE = 10.0
@@ -56,7 +57,7 @@ class Height:
         if self._f.flags.rng_hgt and self._ranging.substitute_on_ground():
             self._ranging.fuse(self._source.offset)
         if self._f.flags.has_height():
-            self._last_known_down = float(self._f.x[9])
+            self._last_known_down = self._f.x.item(PD)
         else:
             self._hold()
 

@@ -63,7 +63,7 @@ class HeightHealth:
                 falling = position.ratio > RATIO_LIMIT
         if self._clips or f.imu.clipping != NO_CLIPPING:
             self._count_clips()
-        bad = (independent or self._clips > 0) and falling
+        bad = falling and (independent or self._clips > 0)
         if bad:
             self._time_bad_us = f.t_now
         else:

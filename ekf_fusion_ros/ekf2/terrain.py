@@ -56,7 +56,8 @@ class Terrain:
         self._predict()
         if finder.fresh:
             self.fuse_range(finder)
-        flow.aid_terrain()
+        if flow.for_terrain:
+            flow.aid_terrain()
         self.keep_below()
 
     def _predict(self) -> None:

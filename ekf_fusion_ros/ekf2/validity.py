@@ -14,7 +14,6 @@ class Validity:
     def __init__(self, f: Filter) -> None:
         """Act on a filter."""
         self._f = f
-        self._exceeded = True
         self._timeout_us = round(f.params.aiding.valid_timeout * SECOND)
 
     def step(self) -> None:
@@ -29,12 +28,14 @@ class Validity:
         f.dead_reckoning = not aided and not flow_aided and not air_aided
         if not f.dead_reckoning:
             f.last_aiding_us = oldest
-        self._exceeded = f.last_aiding_us == 0 or f.late(f.last_aiding_us, self._timeout_us)
 
     @property
     def local_position(self) -> bool:
         """True while the local position is constrained by measurements."""
-        return not self._exceeded and not self._f.holding_position
+        f = self._f
+        if f.holding_position or not f.last_aiding_us:
+            return False
+        return not f.late(f.last_aiding_us, self._timeout_us)
 
     @property
     def global_position(self) -> bool:

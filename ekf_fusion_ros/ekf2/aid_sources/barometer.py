@@ -30,14 +30,14 @@ class Barometer:
         self.count = 0
         self.altitude = 0.0
         self.popped = False
+        self._delay_us = round(f.params.baro.delay_ms * 1000)
         self.faulty = False
         self._time_us = 0
         self._previous_us = 0
 
     def push(self, sample: BaroSample, min_interval_us: int) -> None:
         """Average a raw sample in, and queue the mean when the interval has passed."""
-        delay_us = round(self._f.params.baro.delay_ms * 1000)
-        mean = self._average.add(sample.time_us, sample.altitude, min_interval_us, delay_us)
+        mean = self._average.add(sample.time_us, sample.altitude, min_interval_us, self._delay_us)
         if mean is None:
             return
         stamp, value = mean
@@ -55,7 +55,7 @@ class Barometer:
 
     def check_arrival(self) -> None:
         """Judge whether samples keep coming; call before `pop`."""
-        self.faulty = not self._f.recent(self.buffer.newest_time_us, FAULTY_AFTER_US)
+        self.faulty = self.buffer.newest_time_us + FAULTY_AFTER_US <= self._f.t_now
 
     def learn_offset(self) -> None:
         """Blend the offset towards the newest popped altitude, before the filter runs."""

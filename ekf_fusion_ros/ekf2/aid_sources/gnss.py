@@ -70,7 +70,7 @@ class Gnss:
         self._yaw = GnssYaw(f, resets)
         self.buffer: SampleBuffer[GnssFix] = SampleBuffer(capacity)
         self.popped = False
-        self.height_intermittent = True
+        self._newest_before_pop_us = 0
         self.vision_yaw_forbidden = False
         self._previous_fix_us = 0
         self._interval_us = USUAL_INTERVAL_US
@@ -158,15 +158,17 @@ class Gnss:
         self._resets.move_vertically(origin.alt - altitude_before)
         return True
 
-    def check_arrival(self) -> None:
-        """Judge whether heights keep coming; call before `pop`."""
+    @property
+    def height_intermittent(self) -> bool:
+        """True unless heights keep coming, by the buffer as the period found it."""
         fixes = self.buffer
-        self.height_intermittent = (
-            fixes.newest_time_us + INTERMITTENT_US <= self._f.t_now
-            or fixes.newest is None or not math.isfinite(fixes.newest.altitude))
+        newest_us = self._newest_before_pop_us if self.popped else fixes.newest_time_us
+        return (newest_us + INTERMITTENT_US <= self._f.t_now
+                or fixes.newest is None or not math.isfinite(fixes.newest.altitude))
 
     def pop(self) -> None:
         """Take the fix at the horizon."""
+        self._newest_before_pop_us = self.buffer.newest_time_us
         popped = self.buffer.pop_first_older_than(self._f.t_horizon)
         self.popped = popped is not None
         if popped is not None:

@@ -7,12 +7,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ekf_fusion_ros.ekf2.earth import MIN_FIELD
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.state import EARTH_FIELD
 
 Array = NDArray[np.float64]
 
-MIN_FIELD = 1e-3
 VARIANCE_TOO_SMALL = 1
 """What the kernels return where an innovation variance is below the noise."""
 
@@ -36,7 +36,7 @@ def fuse_three_axes(f: Filter, measured: Array, all_states: bool) -> bool:
     params = f.params.mag
     fit, innovations, variances, (x, y, z), outcome = f.cov.correct_by_field(
         f.x, measured, 2 if f.flags.synthetic_mag_z else 3, max(params.noise, 1e-3) ** 2,
-        params.gate, all_states, table_declination(f), shortest_field(f))
+        params.gate, all_states, table_declination(f), f.earth.shortest_field)
     faults, rejections = f.faults, f.rejections
     first, second, third = outcome
     faults.mag_x, faults.mag_y, faults.mag_z = first != 0, second != 0, third != 0
@@ -47,7 +47,8 @@ def fuse_three_axes(f: Filter, measured: Array, all_states: bool) -> bool:
     f.observations.yaw.test_ratio = 0.0
     rejections.mag_x, rejections.mag_y, rejections.mag_z = x > 1.0, y > 1.0, z > 1.0
     rejections.mag_judged_after_height = True
-    return f.observations.mag.judge(f.t_now, innovations, variances, max(x, y, z))
+    ratio = max(x, y, z)
+    return f.observations.mag.note(f.t_now, innovations, variances, ratio, ratio <= 1.0)
 
 
 def _restart_field_covariance(f: Filter) -> None:
@@ -61,19 +62,11 @@ def fuse_declination(f: Filter, sigma: float) -> None:
     if abs(f.x.item(16)) < MIN_FIELD * 1e-3:
         return
     innovation, variance, outcome = f.cov.fuse_declination(
-        f.x, declination(f), sigma * sigma, table_declination(f), shortest_field(f))
+        f.x, declination(f), sigma * sigma, table_declination(f), f.earth.shortest_field)
     f.faults.declination = outcome != 0
     if outcome == VARIANCE_TOO_SMALL:
         return
-    f.observations.declination.judge(f.t_now, (innovation,), (variance,), 0.0)
-
-
-def shortest_field(f: Filter) -> float:
-    """Return the shortest horizontal field that is plausible here, Gauss."""
-    field = f.earth.field
-    if field is None:
-        return MIN_FIELD
-    return max(MIN_FIELD, 0.5 * field.strength * math.cos(field.inclination))
+    f.observations.declination.note(f.t_now, (innovation,), (variance,), 0.0, True)
 
 
 def synthetic_z(f: Filter, measured: Array) -> float | None:

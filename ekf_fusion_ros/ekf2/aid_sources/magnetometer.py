@@ -25,6 +25,7 @@ from ekf_fusion_ros.ekf2.state import FILTER_PERIOD
 from ekf_fusion_ros.ekf2.state import SECOND
 from ekf_fusion_ros.ekf2.terrain import Terrain
 from ekf_fusion_ros.ekf2.yaw_recovery import YawRecovery
+from ekf_fusion_ros.kernels.compile import machine_code
 from ekf_fusion_ros.kernels.magnetic import low_pass
 from ekf_fusion_ros.samples import MagSample
 
@@ -61,8 +62,10 @@ class Magnetometer:
         self.average = SampleAverage(np.zeros(3))
         self.buffer: SampleBuffer[Array] = SampleBuffer(capacity)
         self.lpf = np.zeros(3)
+        self._low_pass = machine_code(low_pass)
         self.count = 0
         self.popped = False
+        self._delay_us = round(f.params.mag.delay_ms * 1000)
         self.field = np.zeros(3)
         self.aligned_us = 0
         self.inhibit_reset_request = False
@@ -87,8 +90,7 @@ class Magnetometer:
 
     def push(self, sample: MagSample, min_interval_us: int) -> None:
         """Average a raw sample in, and queue the mean when the interval has passed."""
-        delay_us = round(self._f.params.mag.delay_ms * 1000)
-        mean = self.average.add(sample.time_us, sample.field, min_interval_us, delay_us)
+        mean = self.average.add(sample.time_us, sample.field, min_interval_us, self._delay_us)
         if mean is not None:
             self.buffer.push(*mean)
 
@@ -100,7 +102,7 @@ class Magnetometer:
             return
         measured = popped[1]
         if self.count:
-            low_pass(self.lpf, measured, LPF_SHARE)
+            self._low_pass(self.lpf, measured, LPF_SHARE)
         else:
             self.lpf = measured.copy()
         self.count += 1
