@@ -19,7 +19,8 @@ class Holding:
     Middleware does not keep the order of messages across topics. Held this long, and ordered by
     stamp and role, they reach the estimator in one order however they arrived, so that node
     and replay give the same numbers. The fusion horizon lies further back than the hold. `due_us`:
-    the inertial stamp from which `release` has something to give, NEVER where nothing is held.
+    the inertial stamp from which `release` has something to give, NEVER where nothing is held and
+    0 where too much is.
     """
 
     def __init__(self, hold_us: int) -> None:
@@ -53,4 +54,8 @@ class Holding:
         return due
 
     def _note_due(self) -> None:
-        self.due_us = self._heap[0][0] + self._hold_us if self._heap else NEVER
+        heap = self._heap
+        if len(heap) > HELD_MAX:
+            self.due_us = 0
+        else:
+            self.due_us = heap[0][0] + self._hold_us if heap else NEVER

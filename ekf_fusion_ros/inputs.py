@@ -27,6 +27,7 @@ from ekf_fusion_ros.messages.decode_magnetic_field import decode_magnetic_field_
 from ekf_fusion_ros.messages.decode_odometry import decode_odometry
 from ekf_fusion_ros.messages.decode_odometry_rows import decode_odometry_rows
 from ekf_fusion_ros.messages.decode_pressure import decode_pressure
+from ekf_fusion_ros.messages.decode_pressure import decode_pressure_rows
 from ekf_fusion_ros.messages.decode_range import decode_range
 from ekf_fusion_ros.messages.flat import FlatRows
 from ekf_fusion_ros.roles import AIRSPEED
@@ -88,6 +89,7 @@ ROWS_DECODERS: dict[str, Callable[..., Any]] = {
     ODOMETRY: decode_odometry_rows,
     IMU: decode_imu_rows,
     MAGNETIC_FIELD: decode_magnetic_field_rows,
+    PRESSURE: decode_pressure_rows,
 }
 
 ROLE_OF_SAMPLE: dict[type, str] = {

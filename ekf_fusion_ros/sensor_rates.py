@@ -46,8 +46,13 @@ class SensorRates:
     def note(self, role: str, time_us: int) -> None:
         """Count an accepted message by its stamp, once there is inertial time to judge it by."""
         watch = self._watches.get(role)
-        if watch is not None and self.due_us:
-            watch.note(time_us)
+        if watch is None or not self.due_us:
+            return
+        if watch.start_us is None:
+            watch.start_us = time_us
+        else:
+            watch.count += 1
+        watch.newest_us = time_us
 
     def step(self, now_us: int) -> list[str]:
         """Return a sentence for each role that has become too slow by inertial time now_us.
@@ -73,33 +78,26 @@ class _RateWatch:
     def __init__(self, role: str, minimum: int) -> None:
         self._role = role
         self._minimum = minimum
-        self._start_us: int | None = None
-        self._newest_us = 0
-        self._count = 0
+        self.start_us: int | None = None
+        self.newest_us = 0
+        self.count = 0
         self.rate: float | None = None
         self.slow = False
 
-    def note(self, time_us: int) -> None:
-        if self._start_us is None:
-            self._start_us = time_us
-        else:
-            self._count += 1
-        self._newest_us = time_us
-
     def judge(self, now_us: int) -> bool:
         """Close the window where it is full; True when the role has become too slow."""
-        if self._start_us is None:
-            self._start_us = now_us
-        if now_us - self._start_us < WINDOW_US:
+        if self.start_us is None:
+            self.start_us = now_us
+        if now_us - self.start_us < WINDOW_US:
             return False
-        end_us = self._newest_us if self._count else now_us
-        elapsed_us = max(end_us - self._start_us, 1)
-        self.rate = self._count * SECOND_US / elapsed_us
+        end_us = self.newest_us if self.count else now_us
+        elapsed_us = max(end_us - self.start_us, 1)
+        self.rate = self.count * SECOND_US / elapsed_us
         was_slow = self.slow
         percent = RECOVERED_PERCENT if was_slow else SLOW_PERCENT
-        self.slow = 100 * self._count * SECOND_US < percent * self._minimum * elapsed_us
-        if self._count:
-            self._start_us, self._count = self._newest_us, 0
+        self.slow = 100 * self.count * SECOND_US < percent * self._minimum * elapsed_us
+        if self.count:
+            self.start_us, self.count = self.newest_us, 0
         return self.slow and not was_slow
 
     def sentence(self) -> str:

@@ -297,9 +297,11 @@ class FusionSession:
             return []
         if role in FIXES:
             sample = self._with_height(sample)
-        self._holding.push(role, sample)
-        for due in self._holding.release(self._now_us):
-            self._aid(*due)
+        holding = self._holding
+        holding.push(role, sample)
+        if (self._now_us or 0) >= holding.due_us:
+            for due in holding.release(self._now_us):
+                self._aid(*due)
         return []
 
     def _accept_inertial(self, role: str, reading: Any) -> list[FusedOutput]:

@@ -145,7 +145,6 @@ class ImuIntegrator:
 
     def reset(self) -> None:
         """Forget the last reading; the count of gaps stays."""
-        self._last_us: int | None = None
         self._interval_us = 0
         self._before: ImuReading | None = None
         self._steps_us: list[int] = []
@@ -157,28 +156,28 @@ class ImuIntegrator:
 
         Raises Refused 'repeated_stamp' or 'backward_stamp' when time does not advance.
         """
-        last_us, before = self._last_us, self._before
-        if last_us is None or before is None:
-            self._last_us, self._before = reading.time_us, reading
+        before = self._before
+        if before is None:
+            self._before = reading
             return []
-        step_us = reading.time_us - last_us
+        step_us = reading.time_us - before.time_us
         if step_us <= 0:
             reason = 'backward_stamp' if step_us else 'repeated_stamp'
             raise Refused(reason, f'header.stamp is {-step_us} us before the last reading')
-        self._last_us, self._before = reading.time_us, reading
+        self._before = reading
         if step_us > self._max_gap_us:
             self.gaps += 1
             return [_increments(reading, self._interval_us or self._max_gap_us)]
         self._interval_us = step_us
-        missing = 0 < self._longest_us < step_us
-        if missing:
+        if 0 < self._longest_us < step_us:
             samples = self._bridge(before, reading)
-        elif reading.increment is not None and reading.since_us == last_us:
+        elif reading.since_us == before.time_us and reading.increment is not None:
             samples = [reading.increment]
         else:
             samples = [_increments(reading, step_us)]
-        self._steps_us.append(step_us)
-        if len(self._steps_us) == USUAL_OF:
+        steps_us = self._steps_us
+        steps_us.append(step_us)
+        if len(steps_us) == USUAL_OF:
             self._learn_usual_interval()
         return samples
 

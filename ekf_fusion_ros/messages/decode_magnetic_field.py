@@ -49,7 +49,7 @@ def decode_magnetic_field_rows(rows: FlatRows, params: MessageParams) -> list[Ma
     good &= (columns[COVARIANCE][::4] >= 0.0).all(axis=0)
     field = GAUSS_PER_TESLA * np.stack(
         turned_to_body(np.where(good, tesla, 0.0), limits.mount_rpy, rows.frame_id), axis=1)
-    return [MagSample(time_us, row.copy()) if plain else None for plain, time_us, row in zip(
+    return [MagSample(time_us, row) if plain else None for plain, time_us, row in zip(
         good.tolist(), times.tolist(), field, strict=True)]
 
 

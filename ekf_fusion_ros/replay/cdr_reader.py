@@ -59,7 +59,7 @@ def rows_of(kind: str, messages: Sequence[bytes]) -> FlatRows | None:
         names.append(slice(begin, end))
     begin = end + -(end - ORIGIN) % 8
     size = begin + 8 * numbers
-    if any(len(data) != len(first) for data in messages) or len(first) < size:
+    if set(map(len, messages)) != {len(first)} or len(first) < size:
         return None
     table = np.frombuffer(b''.join(messages), np.uint8).reshape(len(messages), -1)
     alike = all((table[:, name] == table[0, name]).all() for name in names)

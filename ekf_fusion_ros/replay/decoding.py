@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Mapping
 from collections.abc import Sequence
+from itertools import repeat
 from typing import Any
 
 from ekf_fusion_ros.messages.flat import FlatMessage
@@ -29,25 +30,39 @@ class BatchDecoder:
         self, topics: Mapping[str, Topic], session: FusionSession, withholding: Withholding,
     ) -> None:
         """Take the topic of each role."""
-        self._one = {topic.name: _decoder(role, topic.type, session, withholding)
-                     for role, topic in topics.items()}
-        self._together = {topic.name: (role, topic.type, decode)
-                          for role, topic in topics.items()
-                          if topic.type in TABLES and role not in withholding.roles
-                          and (decode := session.rows_decoder(role)) is not None}
-        self.names = frozenset(self._one)
+        self._decoders = {topic.name: _decoder_of_many(role, topic.type, session, withholding)
+                          for role, topic in topics.items()}
+        self.names = frozenset(self._decoders)
 
     def decode(self, batch: Sequence[Message]) -> list[Decoded]:
         """Return role and sample, or Refused, of each message in their order."""
-        decoded: list[Decoded | None] = [None] * len(batch)
-        for name, (role, kind, decode) in self._together.items():
-            places = [k for k, message in enumerate(batch) if message[1] == name]
-            rows = _rows(kind, [batch[k][2] for k in places])
-            for k, sample in zip(places, decode(rows) if rows else (), strict=False):
-                decoded[k] = None if sample is None else (role, sample)
-        one = self._one
-        return [one[name](data, time_ns) if done is None else done
-                for (time_ns, name, data), done in zip(batch, decoded, strict=True)]
+        places: dict[str, list[int]] = {name: [] for name in self.names}
+        for place, message in enumerate(batch):
+            places[message[1]].append(place)
+        decoded: list[Any] = [None] * len(batch)
+        for name, ours in places.items():
+            found = self._decoders[name]([batch[place] for place in ours])
+            for place, one in zip(ours, found, strict=True):
+                decoded[place] = one
+        return decoded
+
+
+def _decoder_of_many(
+    role: str, kind: str, session: FusionSession, withholding: Withholding,
+) -> Callable[[Sequence[Message]], list[Decoded]]:
+    """Return what turns messages of a topic into its role and a sample or Refused each."""
+    one = _decoder(role, kind, session, withholding)
+    decode_rows = session.rows_decoder(role)
+    if kind not in TABLES or role in withholding.roles or decode_rows is None:
+        return lambda messages: [one(data, time_ns) for time_ns, _, data in messages]
+
+    def decoded(messages: Sequence[Message]) -> list[Decoded]:
+        rows = _rows(kind, [data for _, _, data in messages])
+        samples = repeat(None, len(messages)) if rows is None else decode_rows(rows)
+        return [one(data, time_ns) if sample is None else (role, sample)
+                for (time_ns, _, data), sample in zip(messages, samples, strict=True)]
+
+    return decoded
 
 
 def _rows(kind: str, messages: Sequence[bytes]) -> FlatRows | None:

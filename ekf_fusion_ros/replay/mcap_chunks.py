@@ -20,7 +20,9 @@ from ekf_fusion_ros.replay.compression import zstd
 MESSAGE, CHUNK_INDEX = 5, 8
 FOOTER_SIZE = 37
 _HEAD = struct.Struct('<BQ').unpack_from
-_MESSAGE = struct.Struct('<H4xQ').unpack_from
+_LENGTH = struct.Struct('<Q').unpack_from
+_MESSAGE = struct.Struct('<QH4xQ').unpack_from
+"""Length of the record, channel and log time."""
 _SIZES, _STORED = struct.Struct('<QII'), struct.Struct('<Q')
 
 
@@ -37,15 +39,15 @@ def chunks_in_order(path: Path) -> list[int]:
 
 def chunk_messages(
     path: Path, chunks: list[int], topics: Mapping[int, str],
-) -> Iterator[tuple[int, str, bytes]]:
-    """Yield (log time ns, topic, bytes) of the channels in `topics`, by log time.
+) -> Iterator[list[tuple[int, str, bytes]]]:
+    """Yield (log time ns, topic, bytes) of the channels in `topics`, by log time, chunk by chunk.
 
     Raises ValueError, struct.error or an error of the decompressor for a damaged chunk.
     """
     # Read, not mapped: mapped pages would count as memory of the process until the end.
     with path.open('rb') as stream:
         for offset in chunks:
-            yield from sorted(_messages(_records(stream, offset), topics), key=itemgetter(0))
+            yield sorted(_messages(_records(stream, offset), topics), key=itemgetter(0))
 
 
 def _index(data: mmap.mmap) -> Iterator[tuple[int, int, int]]:
@@ -87,14 +89,15 @@ def _messages(raw: bytes, topics: Mapping[int, str]) -> list[tuple[int, str, byt
     found = []
     at, size = 0, len(raw)
     while at < size:
-        opcode, length = _HEAD(raw, at)
-        end = at + 9 + length
-        if end > size:
-            raise ValueError('a record of a chunk is cut short')
+        begin, opcode = at, raw[at]
         if opcode == MESSAGE:
-            channel, log_time = _MESSAGE(raw, at + 9)
+            length, channel, log_time = _MESSAGE(raw, at + 1)
+            at += 9 + length
             topic = topics.get(channel)
             if topic is not None:
-                found.append((log_time, topic, raw[at + 31:end]))
-        at = end
+                found.append((log_time, topic, raw[begin + 31:at]))
+        else:
+            at += 9 + _LENGTH(raw, at + 1)[0]
+    if at > size:
+        raise ValueError('a record of a chunk is cut short')
     return found

@@ -6,6 +6,8 @@ from collections.abc import Collection
 from collections.abc import Iterator
 from dataclasses import dataclass
 import heapq
+from itertools import chain
+from itertools import islice
 from operator import itemgetter
 from pathlib import Path
 import shutil
@@ -22,6 +24,7 @@ from ekf_fusion_ros.replay.salvage import Salvage
 from ekf_fusion_ros.replay.salvage import salvage
 
 ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
+BLOCK = 256
 # libyaml, where it is built in, takes a tenth of the time.
 LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 SUFFIXES = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd')
@@ -70,10 +73,9 @@ class Recording:
 
     def messages(self, topics: Collection[str]) -> Iterator[Message]:
         """Yield (log time ns, topic, CDR bytes) of these topics by log time."""
-        streams = [part.messages(frozenset(topics), self.notes) for part in self._parts]
-        merged = streams[0] if len(streams) == 1 else heapq.merge(*streams, key=itemgetter(0))
-        for time_ns, topic, data in merged:
-            yield time_ns, topic, _plain(data) if data.startswith(ZSTD_MAGIC) else data
+        streams = [chain.from_iterable(map(_plain, part.blocks(frozenset(topics), self.notes)))
+                   for part in self._parts]
+        return streams[0] if len(streams) == 1 else heapq.merge(*streams, key=itemgetter(0))
 
     def close(self) -> None:
         """Release files."""
@@ -175,7 +177,8 @@ class _Part:
     start_ns: int | None = None
     end_ns: int | None = None
 
-    def messages(self, topics: frozenset[str], notes: list[str]) -> Iterator[Message]:
+    def blocks(self, topics: frozenset[str], notes: list[str]) -> Iterator[list[Message]]:
+        """Yield the messages of these topics by log time, many at a time."""
         raise NotImplementedError
 
     def close(self) -> None:
@@ -195,14 +198,14 @@ class _IntactPart(_Part):
         if reader.message_count:
             self.start_ns, self.end_ns = reader.start_time, reader.end_time - 1
 
-    def messages(self, topics: frozenset[str], notes: list[str]) -> Iterator[Message]:
+    def blocks(self, topics: frozenset[str], notes: list[str]) -> Iterator[list[Message]]:
         connections = [one for one in self._reader.connections if one.topic in topics]
         last, missing = -1, sum(one.msgcount for one in connections)
         try:
-            for message in self._stream(connections) if connections else ():
-                yield message
-                last = message[0]
-                missing -= 1
+            for block in self._read(connections) if connections else ():
+                yield block
+                missing -= len(block)
+                last = block[-1][0] if block else last
             if missing > 0:
                 notes.append(f'{self._storage.name} is damaged: {missing} messages that it counts '
                              'cannot be read')
@@ -211,18 +214,18 @@ class _IntactPart(_Part):
             # Damaged bytes can make the library raise anything.
             found = salvage(self._storage, self._wanted)
             notes.append(_damage(self._storage, error, found))
-        for message in found.messages:
-            if message[0] > last and message[1] in topics:
-                yield message
+        yield [message for message in found.messages
+               if message[0] > last and message[1] in topics]
 
-    def _stream(self, connections: list[Connection]) -> Iterator[Message]:
+    def _read(self, connections: list[Connection]) -> Iterator[list[Message]]:
         if self._storage.suffix == '.mcap':
             chunks = chunks_in_order(self._storage)
             if chunks:
                 topics = {one.id: one.topic for one in connections}
                 return chunk_messages(self._storage, chunks, topics)
-        return ((time_ns, one.topic, data)
-                for one, time_ns, data in self._reader.messages(connections))
+        messages = ((time_ns, one.topic, data)
+                    for one, time_ns, data in self._reader.messages(connections))
+        return iter(lambda: list(islice(messages, BLOCK)), [])
 
     def close(self) -> None:
         self._reader.close()
@@ -240,11 +243,19 @@ class _SalvagedPart(_Part):
         if found.messages:
             self.start_ns, self.end_ns = found.messages[0][0], found.messages[-1][0]
 
-    def messages(self, topics: frozenset[str], notes: list[str]) -> Iterator[Message]:
-        return (message for message in self._found.messages if message[1] in topics)
+    def blocks(self, topics: frozenset[str], notes: list[str]) -> Iterator[list[Message]]:
+        yield [message for message in self._found.messages if message[1] in topics]
 
 
-def _plain(data: bytes) -> bytes:
+def _plain(block: list[Message]) -> list[Message]:
+    """Return messages decompressed where they are compressed one by one."""
+    if not any(data.startswith(ZSTD_MAGIC) for _, _, data in block):
+        return block
+    return [(time_ns, topic, _decompressed(data) if data.startswith(ZSTD_MAGIC) else data)
+            for time_ns, topic, data in block]
+
+
+def _decompressed(data: bytes) -> bytes:
     """Decompress a message; what cannot be decompressed is left, for the decoder to refuse."""
     try:
         return bytes(zstd.decompress(data))

@@ -14,6 +14,8 @@ from ekf_fusion_ros.messages.decode_magnetic_field import decode_magnetic_field
 from ekf_fusion_ros.messages.decode_magnetic_field import decode_magnetic_field_rows
 from ekf_fusion_ros.messages.decode_odometry import decode_odometry
 from ekf_fusion_ros.messages.decode_odometry_rows import decode_odometry_rows
+from ekf_fusion_ros.messages.decode_pressure import decode_pressure
+from ekf_fusion_ros.messages.decode_pressure import decode_pressure_rows
 from ekf_fusion_ros.messages.flat import FlatRows
 from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.params.messages import ImuMessageParams
@@ -111,6 +113,17 @@ def test_field_rows_equal_single_messages_and_leave_bad_ones():
         alone = decode_magnetic_field(rows.row(k), MessageParams())
         assert np.array_equal(samples[k].field, alone.field)
         assert samples[k].time_us == alone.time_us
+
+
+def test_pressure_rows_equal_single_messages_and_leave_bad_ones():
+    pressures = (math.nan, -1.0, 10.1325, math.inf, 101325.0, 54019.9)
+    rows = good_imu(6)._replace(numbers=np.column_stack((pressures, np.zeros(6))))
+    samples = decode_pressure_rows(rows, MessageParams())
+    assert [sample is None for sample in samples] == [True] * 4 + [False] * 2
+    for k in range(4):
+        with pytest.raises(Refused):
+            decode_pressure(rows.row(k), MessageParams())
+    assert samples[4:] == [decode_pressure(rows.row(k), MessageParams()) for k in (4, 5)]
 
 
 POSE_COVARIANCE, LINEAR, TWIST_COVARIANCE = 7, 43, 49
