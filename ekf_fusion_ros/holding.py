@@ -34,7 +34,11 @@ class Holding:
         self._sequence += 1
         entry = (sample.time_us, RANK[role], self._sequence, role, sample)
         heapq.heappush(self._heap, entry)
-        self._note_due()
+        due_us = sample.time_us + self._hold_us
+        if due_us < self.due_us:
+            self.due_us = due_us
+        if len(self._heap) > HELD_MAX:
+            self.due_us = 0
 
     def release(self, now_us: int | None) -> Sequence[tuple[str, Any]]:
         """Return what is due before the inertial stamp `now_us`; None: before there is one."""
@@ -43,7 +47,7 @@ class Holding:
         while heap and (heap[0][0] <= limit or len(heap) > HELD_MAX):
             due.append(heapq.heappop(heap)[3:])
         if due:
-            self._note_due()
+            self.due_us = heap[0][0] + self._hold_us if heap else NEVER
         return due
 
     def flush(self) -> Sequence[tuple[str, Any]]:
@@ -52,10 +56,3 @@ class Holding:
         self._heap.clear()
         self.due_us = NEVER
         return due
-
-    def _note_due(self) -> None:
-        heap = self._heap
-        if len(heap) > HELD_MAX:
-            self.due_us = 0
-        else:
-            self.due_us = heap[0][0] + self._hold_us if heap else NEVER

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from collections.abc import Mapping
 
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
@@ -43,24 +44,20 @@ class SensorRates:
         self._watches = {role: _RateWatch(role, minimum) for role, minimum in minima.items()}
         self.due_us = 0
 
-    def note(self, role: str, time_us: int) -> None:
-        """Count an accepted message by its stamp, once there is inertial time to judge it by."""
-        watch = self._watches.get(role)
-        if watch is None or not self.due_us:
-            return
-        if watch.start_us is None:
-            watch.start_us = time_us
-        else:
-            watch.count += 1
-        watch.newest_us = time_us
+    @property
+    def roles(self) -> Collection[str]:
+        """Roles that are watched."""
+        return self._watches.keys()
 
-    def step(self, now_us: int) -> list[str]:
+    def step(self, now_us: int, heard: Mapping[str, tuple[int, int]]) -> list[str]:
         """Return a sentence for each role that has become too slow by inertial time now_us.
 
-        To be called when inertial time has reached `due_us`.
+        To be called when inertial time has reached `due_us`. heard: how many messages of each role
+        have been accepted up to now, and the stamp of the newest, us.
         """
         self.due_us = now_us + SECOND_US
-        return [watch.sentence() for watch in self._watches.values() if watch.judge(now_us)]
+        return [watch.sentence() for role, watch in self._watches.items()
+                if watch.judge(now_us, *heard[role])]
 
     def slow(self) -> list[str]:
         """Return a sentence for each role that is too slow."""
@@ -78,26 +75,25 @@ class _RateWatch:
     def __init__(self, role: str, minimum: int) -> None:
         self._role = role
         self._minimum = minimum
-        self.start_us: int | None = None
-        self.newest_us = 0
-        self.count = 0
+        self._start_us: int | None = None
+        self._heard_before = 0
         self.rate: float | None = None
         self.slow = False
 
-    def judge(self, now_us: int) -> bool:
+    def judge(self, now_us: int, heard: int, newest_us: int) -> bool:
         """Close the window where it is full; True when the role has become too slow."""
-        if self.start_us is None:
-            self.start_us = now_us
-        if now_us - self.start_us < WINDOW_US:
+        if self._start_us is None:
+            self._start_us, self._heard_before = now_us, heard
+        if now_us - self._start_us < WINDOW_US:
             return False
-        end_us = self.newest_us if self.count else now_us
-        elapsed_us = max(end_us - self.start_us, 1)
-        self.rate = self.count * SECOND_US / elapsed_us
+        count = heard - self._heard_before
+        elapsed_us = max((newest_us if count else now_us) - self._start_us, 1)
+        self.rate = count * SECOND_US / elapsed_us
         was_slow = self.slow
         percent = RECOVERED_PERCENT if was_slow else SLOW_PERCENT
-        self.slow = 100 * self.count * SECOND_US < percent * self._minimum * elapsed_us
-        if self.count:
-            self.start_us, self.count = self.newest_us, 0
+        self.slow = 100 * count * SECOND_US < percent * self._minimum * elapsed_us
+        if count:
+            self._start_us, self._heard_before = newest_us, heard
         return self.slow and not was_slow
 
     def sentence(self) -> str:

@@ -286,7 +286,6 @@ class FusionSession:
             return self._accept_inertial(role, sample)
         if role not in PARTS_OF_FIX:
             self._statistics[role].accepted += 1
-        self._rates.note(role, sample.time_us)
         if role == LANDED:
             self._landed = sample
             self._navigation.note(sample)
@@ -307,11 +306,17 @@ class FusionSession:
     def _accept_inertial(self, role: str, reading: Any) -> list[FusedOutput]:
         time_us = reading.time_us
         self._statistics[role].accepted += 1
-        self._rates.note(role, time_us)
         if time_us >= self._rates.due_us:
-            for slow in self._rates.step(time_us):
+            heard = {watched: self._heard(watched) for watched in self._rates.roles}
+            for slow in self._rates.step(time_us, heard):
                 self._tell(time_us, slow)
         return self._run(role, reading)
+
+    def _heard(self, role: str) -> tuple[int, int]:
+        """Return how many messages of a role were not refused, and the newest stamp."""
+        statistics = self._statistics[role]
+        order = self._inertial_order if role == self._inertial_role else self._aiding_order[role]
+        return statistics.received - statistics.refused_total, order.last or 0
 
     def _with_height(self, fix: GnssSample) -> GnssSample:
         if math.isfinite(fix.alt):

@@ -93,13 +93,12 @@ def test_without_pressure_the_fixes_are_the_height(drive):
 
 def test_one_lost_message_is_not_slow():
     rates = SensorRates({'imu': 100, 'pressure': 5})
-    told = []
+    heard, told = {'imu': (0, 0), 'pressure': (0, 0)}, []
     for step in range(3000):
         now_us = START_US + 10_000 * step
-        rates.note('imu', now_us)
-        if step % 20 == 0 and step != 1000:
-            rates.note('pressure', now_us)
-        told += rates.step(now_us)
+        for role, due in (('imu', True), ('pressure', step % 20 == 0 and step != 1000)):
+            heard[role] = (heard[role][0] + 1, now_us) if due else heard[role]
+        told += rates.step(now_us, heard)
     assert told == []
 
 
@@ -107,8 +106,7 @@ def test_the_rate_is_that_of_the_stamps_whatever_their_jitter():
     rates = SensorRates({'imu': 100})
     for step in range(700):
         now_us = START_US + 12_500 * step + (step * 7919) % 3000
-        rates.note('imu', now_us)
-        rates.step(now_us)
+        rates.step(now_us, {'imu': (step + 1, now_us)})
     assert float(rates.values()['rate.imu']) == pytest.approx(80.0, abs=0.1)
     assert len(rates.slow()) == 1
 
