@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ekf_fusion_ros.geo.projection import Wgs84Projection
 from ekf_fusion_ros.mathlib.angles import wrap_pi
-from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
+from ekf_fusion_ros.mathlib.rotation import turned
 from ekf_fusion_ros.odometry_drift import OdometryDrift
 from ekf_fusion_ros.params.two_topic import MotionHeadingParams
 from ekf_fusion_ros.params.two_topic import TwoTopicParams
@@ -125,7 +125,7 @@ class MotionHeading:
         if sample.velocity_frame is VelocityFrame.BODY_FRD:
             if math.isnan(sample.quaternion[0]):
                 return None
-            velocity = matrix_from_quat(sample.quaternion) @ velocity
+            velocity = np.array(turned(sample.quaternion, velocity))
         if not self._track:
             return 0j
         before_us, before, _ = self._track[-1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
+from ekf_fusion_ros.mathlib.rotation import turned
 from ekf_fusion_ros.samples import VelocityFrame
 from ekf_fusion_ros.samples import VisionSample
 
@@ -53,7 +53,7 @@ class TwistCheck:
             self._restart(sample if usable else None)
             return False
         dt = 1e-6 * (sample.time_us - last.time_us)
-        north, east, _ = (matrix_from_quat(sample.quaternion) @ sample.velocity).tolist()
+        north, east, _ = turned(sample.quaternion, sample.velocity)
         self._turned += dt * complex(north, east)
         self._plain += dt * complex(sample.velocity[0], sample.velocity[1])
         if sample.time_us - begin.time_us < SEGMENT_US:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ekf_fusion_ros.kernels.compile import kernel
+from ekf_fusion_ros.kernels.innovation import project
 from ekf_fusion_ros.kernels.update import apply_update
 from ekf_fusion_ros.kernels.update import test_ratio
 
@@ -54,13 +55,6 @@ def body_velocity(q: Array, velocity: Array, body: Array, jacobian: Array) -> No
 
 
 @kernel
-def _project_rows(p: Array, jacobian: Array, row: int, hp: Array) -> float:
-    """Fill hp (24,) with H P, H a row of the jacobian (3, 7) by states 0 to 6; return H P H'."""
-    hp[:] = np.dot(jacobian[row], p[0:7])
-    return float(np.dot(jacobian[row], hp[0:7]))
-
-
-@kernel
 def fuse_body_velocity(
     p: Array, x: Array, measured: Array, noise: Array, gate: float, limits: Array,
 ) -> tuple[Three, Three, Three, int]:
@@ -75,7 +69,7 @@ def fuse_body_velocity(
     body_velocity(x, x[4:7], body, jacobian)
     for axis in range(3):
         innovation[axis] = body[axis] - measured[axis]
-        variance[axis] = _project_rows(p, jacobian, axis, hp) + noise[axis]
+        variance[axis] = project(p, jacobian[axis], hp) + noise[axis]
         ratio[axis] = test_ratio(innovation[axis], variance[axis], gate)
     faults = 0
     for axis in range(3):
@@ -83,7 +77,7 @@ def fuse_body_velocity(
         if judged > 1.0:
             continue
         body_velocity(x, x[4:7], body, jacobian)
-        spread = _project_rows(p, jacobian, axis, hp) + noise[axis]
+        spread = project(p, jacobian[axis], hp) + noise[axis]
         if not apply_update(p, x, hp / spread, hp, body[axis] - measured[axis], limits):
             faults += 1 << axis
     return ((innovation[0], innovation[1], innovation[2]),

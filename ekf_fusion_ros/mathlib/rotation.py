@@ -106,6 +106,15 @@ def fill_matrix(q: Array, rot: Array) -> None:
     rot[2, 2] = a - b - c + d
 
 
+def turned(q: Array, v: Array) -> tuple[float, float, float]:
+    """Return R(q) v (3,) of a unit quaternion, in floats: numpy takes longer to look at so few."""
+    w, x, y, z = q.tolist()
+    a, b, c = v.tolist()
+    tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
+    return (a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz,
+            c + w * tz + x * ty - y * tx)
+
+
 @kernel
 def relative_rotation(p: Array, q: Array) -> Array:
     """Return the matrix (3, 3) of p q^-1: from the frame q leads to, to that of p."""

@@ -27,6 +27,7 @@ from ekf_fusion_ros.mathlib.rotation import quat_multiply
 from ekf_fusion_ros.mathlib.rotation import quat_normalise
 from ekf_fusion_ros.mathlib.rotation import rolls_more_than_pitches
 from ekf_fusion_ros.mathlib.rotation import rotation_vector_from_quat
+from ekf_fusion_ros.mathlib.rotation import turned
 from ekf_fusion_ros.mathlib.rotation import with_yaw
 from ekf_fusion_ros.mathlib.rotation import yaw_312
 from ekf_fusion_ros.mathlib.rotation import yaw_321
@@ -61,6 +62,7 @@ def test_normalised(q, size):
 @given(q=quaternions(), v=vectors(3, 5.0))
 def test_matrix_turns_body_into_earth(q, v):
     np.testing.assert_allclose(matrix_from_quat(q) @ v, scipy_rotation(q).apply(v), atol=1e-12)
+    np.testing.assert_allclose(turned(q, v), scipy_rotation(q).apply(v), atol=1e-12)
 
 
 @MANY
