@@ -46,7 +46,7 @@ LIBRARIES = {
     'geo': {'pygeomag'},
     'params': {'yaml', 'pyulog'},
     'kernels.compile': {'numba', 'scipy'},
-    'node': {'rclpy', 'rcl_interfaces'} | MESSAGES,
+    'node': {'rclpy', 'rcl_interfaces', 'diagnostic_updater'} | MESSAGES,
     'replay': {'rosbags', 'tqdm', 'yaml', 'lz4', 'backports', 'compression'},
     'analysis': {'matplotlib'},
 }

@@ -1,12 +1,10 @@
-"""/diagnostics: reports as a DiagnosticArray.
-
-The messages are those that diagnostic_updater would send; its timer runs on ROS time and falls
-silent with /clock, which is when one wants to know why.
-"""
+"""/diagnostics: reports by diagnostic_updater where it is installed, by our own hand elsewhere."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
+from typing import Protocol
 
 from diagnostic_msgs.msg import DiagnosticArray
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -15,9 +13,27 @@ from rclpy.node import Node
 
 from ekf_fusion_ros.live.report import Report
 
+NO_HARDWARE = 'none'
 
-class DiagnosticsPublisher:
+
+class Diagnostics(Protocol):
     """Publishes reports as a DiagnosticArray, one status per subject."""
+
+    def publish(self, reports: Iterable[Report]) -> None:
+        """Publish reports, stamped by the node's clock."""
+
+
+def make_diagnostics(node: Node) -> Diagnostics:
+    """Return what publishes the diagnostics of a node."""
+    try:
+        from diagnostic_updater import Updater
+    except ImportError:
+        return PlainDiagnostics(node)
+    return UpdaterDiagnostics(node, Updater)
+
+
+class PlainDiagnostics:
+    """Builds the DiagnosticArray itself; each status bears the full name of the node."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -36,5 +52,39 @@ class DiagnosticsPublisher:
             level=bytes([report.level]),
             name=f'{self._name}: {report.subject}',
             message=report.text,
-            hardware_id='none',
+            hardware_id=NO_HARDWARE,
             values=[KeyValue(key=key, value=value) for key, value in report.values.items()])
+
+
+class UpdaterDiagnostics:
+    """Hands reports to an Updater, a task for each subject.
+
+    It publishes when it is given reports: the timer of the Updater runs on ROS time and would fall
+    silent with /clock, which is when one wants to know why. Its names lack the namespace of the
+    node; the hardware id holds it.
+    """
+
+    def __init__(self, node: Node, updater: Any) -> None:
+        self._updater = updater(node)
+        self._updater.timer.cancel()
+        self._updater.setHardwareID(node.get_namespace().strip('/') or NO_HARDWARE)
+        self._reports: dict[str, Report] = {}
+        self._subjects: set[str] = set()
+
+    def publish(self, reports: Iterable[Report]) -> None:
+        """Publish reports, stamped by the node's clock."""
+        self._reports = {report.subject: report for report in reports}
+        for subject in self._subjects - self._reports.keys():
+            self._updater.removeByName(subject)
+        for subject in [one for one in self._reports if one not in self._subjects]:
+            self._updater.add(subject, self._fill)
+        self._subjects = set(self._reports)
+        self._updater.force_update()
+
+    def _fill(self, status: Any) -> Any:
+        """Complete a status, which bears its subject as its name until it is published."""
+        report = self._reports[status.name]
+        status.summary(bytes([report.level]), report.text)
+        for key, value in report.values.items():
+            status.add(key, value)
+        return status

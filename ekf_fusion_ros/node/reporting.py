@@ -18,7 +18,7 @@ from ekf_fusion_ros.live.situation import situation
 from ekf_fusion_ros.live.switches import Switches
 from ekf_fusion_ros.live.work_watch import EstimatorWatch
 from ekf_fusion_ros.live.work_watch import WorkWatch
-from ekf_fusion_ros.node.diagnostics import DiagnosticsPublisher
+from ekf_fusion_ros.node.diagnostics import make_diagnostics
 from ekf_fusion_ros.node.inputs import Inputs
 from ekf_fusion_ros.node.navigation import NavigationPublisher
 from ekf_fusion_ros.session import FusionSession
@@ -40,7 +40,7 @@ class Reporting:
         self._work = work
         self._navigation = navigation
         self._queued = queued
-        self._diagnostics = DiagnosticsPublisher(node)
+        self._diagnostics = make_diagnostics(node)
         self._estimator = EstimatorWatch()
         self._newest_us: int | None = None
         self.output = OutputWatch(
