@@ -67,6 +67,8 @@ def _load_ulog(path: Path, base: Params) -> LoadedParams:
 def _from_px4(
     path: Path, base: Params, numbers: dict[str, float], remarks: list[str],
 ) -> LoadedParams:
+    if not numbers:
+        raise ValueError('; '.join([f'{path}: holds no parameter of EKF2 or LPE', *remarks]))
     foreign = {name: shortest(value) for name, value in numbers.items()}
     values, unused = _translated(path, foreign, base)
     return LoadedParams(_applied(path, base, values), unused + remarks)

@@ -149,6 +149,17 @@ def translate(foreign: Mapping[str, Any], base: Ekf2Params) -> tuple[dict[str, A
     return values, unused
 
 
+def counterparts(name: str) -> list[str]:
+    """Return the parameters here that a PX4 or ECL name stands for, none where it is unknown."""
+    if name in BIT_MASKS:
+        return [target for target in BIT_MASKS[name] if target.startswith(OURS)]
+    if name in ENUMERATIONS:
+        return [ENUMERATIONS[name][0]]
+    axes = {first + axis: target for first, target in AXES.items() for axis in 'XYZ'}
+    ours = _plain_names(Ekf2Params()) | SWITCHES | MICROSECONDS | axes
+    return [ours[name]] if name in ours else []
+
+
 def _plain_names(base: Ekf2Params) -> dict[str, str]:
     names = SECONDS | MILLISECONDS
     for tree, prefix in ((base, 'ekf2.'), (LpeParams(), 'lpe.'), (MessageParams(), 'messages.'),

@@ -18,6 +18,7 @@ from ekf_fusion_ros.params.health import HealthParams
 from ekf_fusion_ros.params.lpe import LpeParams
 from ekf_fusion_ros.params.messages import MessageParams
 from ekf_fusion_ros.params.node import NodeParams
+from ekf_fusion_ros.params.px4 import counterparts
 from ekf_fusion_ros.params.receivers import ReceiversParams
 from ekf_fusion_ros.params.session import SessionParams
 from ekf_fusion_ros.params.spec import leaves
@@ -67,6 +68,10 @@ def unknown_name(name: str, known: set[str]) -> str:
     """Say that a parameter does not exist and which it may have meant."""
     if any(other.startswith(f'{name}.') for other in known):
         return f'{name} is a group of parameters: name one of them, as in {name}.<parameter>'
+    ours = counterparts(name)
+    if ours:
+        return (f'unknown parameter {name}: that is the name of PX4, which a .params file may '
+                f'hold; here it is {", ".join(ours)}')
     last = name.rsplit('.', 1)[-1]
     near = [other for other in sorted(known) if other.rsplit('.', 1)[-1] == last]
     near += difflib.get_close_matches(name, sorted(known), n=3)

@@ -95,6 +95,16 @@ def test_an_estimator_that_is_not_there_is_refused_with_those_that_are() -> None
         with_overrides(Params(), {'estimator': 'inav'})
 
 
+@pytest.mark.parametrize(('name', 'ours'), [
+    ('EKF2_GPS_DELAY', 'ekf2.gnss.delay_ms'), ('EKF2_GPS_POS_Y', 'ekf2.gnss.position'),
+    ('EKF2_HGT_REF', 'ekf2.height.reference'), ('EKF2_RNG_AID', 'ekf2.range.aid'),
+    ('EKF2_TERR_MASK', 'ekf2.terrain.use_range, ekf2.terrain.use_flow')])
+def test_a_name_of_px4_is_answered_with_ours(name: str, ours: str) -> None:
+    with pytest.raises(ValueError, match=f'{name}: that is the name of PX4') as error:
+        with_overrides(Params(), {name: 1})
+    assert str(error.value).endswith(f'here it is {ours}')
+
+
 def test_every_parameter_has_words_and_a_default_inside_its_range() -> None:
     for name, value, spec in leaves(Params()):
         assert spec.description.endswith('.'), name
