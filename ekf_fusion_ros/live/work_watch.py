@@ -45,6 +45,7 @@ class WorkWatch:
         self._busy = 0.0
         self._longest = 0.0
         self._runs = 0
+        self._cpu = 0.0
         self.trouble: Counter[str] = Counter(internal_errors=0, stalls=0)
 
     def begin(self, now: float) -> None:
@@ -65,18 +66,23 @@ class WorkWatch:
         self._longest = max(self._longest, took)
         self._runs += 1
 
-    def report(self, now: float, queued: int, late: int, horizon: str) -> Report:
+    def report(self, now: float, cpu: float, queued: int, late: int, horizon: str) -> Report:
         """Report since the last report.
 
-        `queued` messages wait; `late` ones came too late for the horizon, `horizon` s behind now.
+        cpu: time in s that the thread has computed so far, messages that come included; `queued`
+        messages wait; `late` ones came too late for the horizon, `horizon` s behind now.
         """
         elapsed = now - (now if self._since is None else self._since)
-        share = self._busy / elapsed if elapsed > 0.0 else 0.0
+        per_second = 1.0 / elapsed if elapsed > 0.0 else 0.0
+        core, thread = self._busy * per_second, (cpu - self._cpu) * per_second
+        share = max(core, thread)
         values = {
-            'busy_share': f'{share:.3f}', 'longest_run_ms': f'{1e3 * self._longest:.2f}',
+            'busy_share': f'{core:.3f}', 'thread_share': f'{thread:.3f}',
+            'longest_run_ms': f'{1e3 * self._longest:.2f}',
             'runs': str(self._runs), 'queued': str(queued), 'late_samples': str(late),
             'horizon_delay': horizon}
         level = HealthLevel.WARN if share > BUSY_SHARE else HealthLevel.OK
         text = f'busy {100 * share:.0f} % of the time, {queued} messages waiting'
         self._since, self._busy, self._longest, self._runs = now, 0.0, 0.0, 0
+        self._cpu = cpu
         return Report('timing', level, text, values)

@@ -92,7 +92,8 @@ class Reporting:
         reports += [further() for further in self.further]
         late = sum(one.refused.get(reason, 0) for one in counts.values() for reason in LATE)
         reports.append(self._work.report(
-            now, self._queued(), late, health.values.get('horizon_delay', '')))
+            now, time.thread_time(), self._queued(), late,
+            health.values.get('horizon_delay', '')))
         newest = self._newest_us
         reports.append(self.output.report(
             now, None if newest is None or not ros_now else ros_now - 1e-6 * newest))

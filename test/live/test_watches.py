@@ -72,11 +72,16 @@ def test_work_is_measured_and_stalls_are_counted() -> None:
         work.begin(start)
         work.end(end)
     assert work.trouble['stalls'] == 1
-    report = work.report(1.0, 3, 2, '0.200')
+    report = work.report(1.0, 0.3, 3, 2, '0.200')
+    assert (report.level, report.text) == (
+        HealthLevel.OK, 'busy 30 % of the time, 3 messages waiting')
     assert report.values['busy_share'] == '0.007'
     assert report.values['longest_run_ms'] == '4.00'
     assert (report.values['queued'], report.values['late_samples']) == ('3', '2')
-    assert work.report(2.0, 0, 2, '0.200').values['runs'] == '0'
+    flooded = work.report(2.0, 1.25, 0, 2, '0.200')
+    assert (flooded.level, flooded.text) == (
+        HealthLevel.WARN, 'busy 95 % of the time, 0 messages waiting')
+    assert flooded.values['runs'] == '0'
 
 
 def test_receiver_checks_pass_fail_or_are_skipped() -> None:
