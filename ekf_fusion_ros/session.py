@@ -400,22 +400,23 @@ class FusionSession:
 
     def _advance(self, imu: ImuSample) -> FusedOutput | None:
         """Step the estimator by one increment and return the output that is due, if any."""
-        first, self._now_us = self._now_us is None, imu.time_us
-        self._estimator.push(imu)
+        time_us, estimator = imu.time_us, self._estimator
+        first, self._now_us = self._now_us is None, time_us
+        estimator.push(imu)
         if first:
             self._tell_landed()
-        if not self._estimator.update():
+        if not estimator.update():
             return None
         if self._on_update is not None:
-            self._on_update(self._estimator)
-        if imu.time_us >= self._navigation.due_us:
-            self._note(self._navigation.step(imu.time_us, self._estimator))
+            self._on_update(estimator)
+        if time_us >= self._navigation.due_us:
+            self._note(self._navigation.step(time_us, estimator))
         # Rows stand at filter updates, so those of any rate are a subset of all updates.
-        tick = imu.time_us * self._rate_mhz // 1_000_000_000
+        tick = time_us * self._rate_mhz // 1_000_000_000
         if self._rate_mhz and tick == self._tick:
             return None
         self._tick = tick
-        nav = self._estimator.nav_state()
+        nav = estimator.nav_state()
         if nav is None:
             return None
         note_milestones(self.milestones, nav)

@@ -160,7 +160,8 @@ class ImuIntegrator:
         if before is None:
             self._before = reading
             return []
-        step_us = reading.time_us - before.time_us
+        before_us = before.time_us
+        step_us = reading.time_us - before_us
         if step_us <= 0:
             reason = 'backward_stamp' if step_us else 'repeated_stamp'
             raise Refused(reason, f'header.stamp is {-step_us} us before the last reading')
@@ -171,7 +172,7 @@ class ImuIntegrator:
         self._interval_us = step_us
         if 0 < self._longest_us < step_us:
             samples = self._bridge(before, reading)
-        elif reading.since_us == before.time_us and reading.increment is not None:
+        elif reading.since_us == before_us and reading.increment is not None:
             samples = [reading.increment]
         else:
             samples = [_increments(reading, step_us)]

@@ -139,8 +139,9 @@ def test_fused_bag_holds_the_rows(replayed):
     assert len(odometry) == len(table)
     for message, row in zip(odometry[::50], table[::50], strict=True):
         position = message.pose.pose.position
-        assert [position.x, position.y, position.z] == row[1:4].tolist()
-        assert message.pose.covariance[0] == row[12]
+        fourteen_digits = pytest.approx([*row[1:4], row[12]], rel=1e-13)
+        assert [position.x, position.y, position.z,
+                message.pose.covariance[0]] == fourteen_digits
         stamp = message.header.stamp
         assert stamp.sec + stamp.nanosec * 1e-9 == pytest.approx(row[0], abs=1e-6)
 
