@@ -77,7 +77,7 @@ class Ekf2:
         self._alignment = Alignment(self.filter, self.control.mag, self.control.baro,
                                     self.control.height_source, self._observation_length)
         self._accel_bias_check = AccelBiasCheck(self.filter)
-        self._lapse = InertialLapse(self.filter, self.control.resets, self.control.bank)
+        self.lapse = InertialLapse(self.filter, self.control.resets, self.control.bank)
         self._ground_contact = GroundContact(self.filter)
         self._raw: ImuSample | None = None
         self._nav: NavState | None = None
@@ -189,7 +189,7 @@ class Ekf2:
         f.faults.accel_clipping = f.imu.clipping != NO_CLIPPING
         if learned:
             self._accel_bias_check.step(down_bias)
-        self._lapse.step()
+        self.lapse.step(self.inertial.ring[-1])
 
     def _push_fix(self, sample: GnssSample, min_interval_us: int) -> None:
         altitude_before = self.filter.earth.alt_ref

@@ -31,6 +31,9 @@ def nav_state(ekf: Ekf2) -> NavState:
     if ekf.params.imu.position != ZERO:
         lever = np.asarray(ekf.params.imu.position)
         velocity, position = out.velocity_at_origin(lever), out.position_at_origin(lever)
+    pose_cov, velocity_cov = row[22:58].reshape(6, 6), row[58:67].reshape(3, 3)
+    if ekf.lapse.ahead:
+        ekf.lapse.widen(pose_cov, velocity_cov)
     validity = ekf.control.validity
     terrain = ekf.control.terrain
     wind = f.flags.wind
@@ -40,8 +43,8 @@ def nav_state(ekf: Ekf2) -> NavState:
         velocity=velocity,
         position=position,
         angular_rate=row[10:13],
-        pose_cov=row[22:58].reshape(6, 6),
-        velocity_cov=row[58:67].reshape(3, 3),
+        pose_cov=pose_cov,
+        velocity_cov=velocity_cov,
         gyro_bias=row[16:19],
         accel_bias=row[19:22],
         origin=f.earth.origin,

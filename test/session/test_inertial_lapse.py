@@ -32,15 +32,23 @@ def test_track_after_an_imu_was_silent(start, lapse):
         for output in session.push(arrival.sample):
             nav = output.nav
             yaw = yaw_of(matrix_from_quat(nav.quaternion))
-            rows.append((1e-6 * (nav.time_us - scenario.start_us), *nav.position[0:2], yaw))
+            sigmas = np.sqrt(nav.pose_cov.diagonal()[[0, 1, 5]])
+            seconds = 1e-6 * (nav.time_us - scenario.start_us)
+            rows.append((seconds, *nav.position[0:2], yaw, *sigmas))
     table = np.array(rows)
     truth = scenario.trajectory.motion(table[:, 0])
     error = table[:, 1:3] - truth.position[:, 0:2]
     error -= np.median(error, axis=0)
+    # until the fusion horizon has passed the lapse only the sigma tells of it
+    ahead = (table[:, 0] > start + lapse) & (table[:, 0] < start + lapse + 0.15)
+    assert ahead.sum() > 5
+    assert np.hypot(*error[ahead].T).min() > 3.0
+    assert (np.abs(error[ahead]) < 3.0 * table[ahead, 4:6]).all()
     after = table[:, 0] > start + lapse + 3.0
     assert np.hypot(*error[after].T).max() < 5.0
     yaw = np.array([yaw_of(rotation) for rotation in truth.rotation])
     wrong = np.array([abs(wrap_pi(angle)) for angle in table[:, 3] - yaw])
     assert np.degrees(wrong[after].max()) < 12.0
+    assert (wrong[ahead] < 3.0 * table[ahead, 6]).all()
     texts = [event.text for event in session.drain_events()]
     assert f'inertial data missing, attitude and motion doubted: {lapse:.1f} s' in texts
