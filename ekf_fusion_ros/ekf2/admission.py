@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -19,12 +20,12 @@ from ekf_fusion_ros.samples import VisionSample
 
 Shape = tuple[int, ...]
 THREE = (3,)
-CONTIGUOUS = (8,)
-THREE_FLOATS = 24
-"""Strides and size in bytes of three numbers in a row."""
-
 FLOAT = np.dtype(np.float64)
 """Of the byte order of this machine: another is not equal."""
+
+THREE_FLOATS = (np.ndarray, FLOAT, (8,), 24)
+_layout = attrgetter('__class__', 'dtype', 'strides', 'nbytes')
+"""What tells a row of three numbers from all else, and how to look at it."""
 
 MEASURED: dict[type[Any], dict[str, Shape]] = {
     ImuSample: {'delta_angle': THREE, 'delta_velocity': THREE},
@@ -70,13 +71,11 @@ def admitted_imu(sample: ImuSample) -> ImuSample:
 
     Whether its numbers are finite is left to the kernel that takes them (InertialInput.add).
     """
-    _, angle, velocity, _, _, _, _ = sample
-    # Of every raw sample, so without a call: see _is_plain.
-    if (type(angle) is type(velocity) is np.ndarray
-            and angle.dtype == velocity.dtype == FLOAT
-            and angle.nbytes == velocity.nbytes == THREE_FLOATS
-            and angle.strides == velocity.strides == CONTIGUOUS):
-        return sample
+    try:
+        if _layout(sample.delta_angle) == _layout(sample.delta_velocity) == THREE_FLOATS:
+            return sample
+    except AttributeError:
+        pass
     changed: ImuSample = _changed(sample)
     return changed
 

@@ -181,15 +181,15 @@ class Ekf2:
 
     def _predict(self) -> None:
         """Carry states and covariance over the filter period at the horizon."""
-        f = self.filter
-        f.imu = self.inertial.ring[0]
+        f, ring = self.filter, self.inertial.ring
+        imu, faults = ring[0], f.faults
+        f.imu = imu
         f.dt_avg, down_bias, learned = f.cov.predict(
-            f.x, f.rot, f.imu, f.earth.rate_ned, f.dt_avg, f.flags.in_air,
-            f.faults.accel_vertical)
-        f.faults.accel_clipping = f.imu.clipping != NO_CLIPPING
+            f.x, f.rot, imu, f.earth.rate_ned, f.dt_avg, f.flags.in_air, faults.accel_vertical)
+        faults.accel_clipping = imu.clipping != NO_CLIPPING
         if learned:
             self._accel_bias_check.step(down_bias)
-        self.lapse.step(self.inertial.ring[-1])
+        self.lapse.step(ring[-1])
 
     def _push_fix(self, sample: GnssSample, min_interval_us: int) -> None:
         altitude_before = self.filter.earth.alt_ref

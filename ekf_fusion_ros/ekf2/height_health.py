@@ -50,6 +50,10 @@ class HeightHealth:
         f = self._f
         velocity, position = f.ver_vel_check, f.ver_pos_check
         suspicious = velocity.ratio > RATIO_LIMIT or position.ratio > RATIO_LIMIT
+        clips = self._clips or f.imu.clipping != NO_CLIPPING
+        if not (suspicious or clips or f.faults.accel_vertical):
+            self._time_good_us = f.t_now
+            return
         falling = independent = False
         if suspicious and f.recent(position.time_us, SECOND):
             if f.recent(velocity.time_us, SECOND):
@@ -61,7 +65,7 @@ class HeightHealth:
                            or (position.ratio > RATIO_LIMIT and velocity.ratio > 0.0))
             else:
                 falling = position.ratio > RATIO_LIMIT
-        if self._clips or f.imu.clipping != NO_CLIPPING:
+        if clips:
             self._count_clips()
         bad = falling and (independent or self._clips > 0)
         if bad:
