@@ -53,7 +53,8 @@ def third_party(folder: Path) -> set[str]:
                         first, ast.Constant):
                     names.add(str(first.value))
     roots = {name.partition('.')[0] for name in names}
-    ours = {'ekf_fusion_ros', ''} | {path.stem for path in (ROOT / 'test').rglob('*')}
+    ours = {'ekf_fusion_ros', ''} | {
+        path.stem for path in (ROOT / 'test').rglob('*') if path.parent.name != 'stand_ins'}
     return roots - set(sys.stdlib_module_names) - ours
 
 

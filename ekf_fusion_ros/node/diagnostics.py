@@ -14,6 +14,7 @@ from rclpy.node import Node
 from ekf_fusion_ros.live.report import Report
 
 NO_HARDWARE = 'none'
+PERIOD = 'diagnostic_updater.period'
 
 
 class Diagnostics(Protocol):
@@ -65,6 +66,9 @@ class UpdaterDiagnostics:
     """
 
     def __init__(self, node: Node, updater: Any) -> None:
+        if node.has_parameter(PERIOD):
+            # Declared with all that the user has set; the Updater declares it itself.
+            node.undeclare_parameter(PERIOD)
         self._updater = updater(node)
         self._updater.timer.cancel()
         self._updater.setHardwareID(node.get_namespace().strip('/') or NO_HARDWARE)

@@ -22,9 +22,9 @@ from ekf_fusion_ros.params.spec import leaves
 from ekf_fusion_ros.params.tree import Params
 from ekf_fusion_ros.params.tree import with_overrides
 
-# Parameters that ROS 2 itself gives to every node.
+# Parameters that ROS 2 and its libraries give to every node.
 ROS_PARAMETERS = ('use_sim_time', 'start_type_description_service')
-ROS_PREFIXES = ('qos_overrides.',)
+ROS_PREFIXES = ('qos_overrides.', 'diagnostic_updater.')
 
 
 def declare_parameters(node: Node) -> Params:
