@@ -35,6 +35,7 @@ def excluded_from(flown):
     return {text.split(':')[0] for text in flown.events if 'position excluded' in text}
 
 
+@pytest.mark.slow
 def test_the_blend_beats_the_better_receiver():
     """In the fixes that the filter gets and in its output, over seeds and nearly in each."""
     flights = {seed: fly({'fix': BETTER, 'fix_2': WORSE}, seed) for seed in SEEDS}

@@ -50,6 +50,7 @@ def test_no_step_where_one_goes_comes_back_or_lies(role, change, seed):
         assert change_of_gap(flown, fly(two, seed), switch) < STEP
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(('change', 'back'), [(dropped, ON), (biased, ON + 5.0)])
 def test_one_that_comes_back_is_followed_gently(change, back):
     """With slow errors alone, which the noise does not hide, and of the better receiver.

@@ -44,6 +44,7 @@ def flown(scale, seed):
     return time, table[:, 1:] - truth, np.array(covariances)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('scale', [0.0, 0.05])
 def test_errors_are_of_the_size_that_is_stated(scale):
     nees, squares = [], []
