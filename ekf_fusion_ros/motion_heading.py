@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
@@ -121,11 +122,11 @@ class MotionHeading:
             return complex(sample.position[0], sample.position[1])
         if not sample.has_velocity:
             return None
-        velocity = sample.velocity
+        velocity: Sequence[float] = sample.velocity.tolist()
         if sample.velocity_frame is VelocityFrame.BODY_FRD:
             if math.isnan(sample.quaternion[0]):
                 return None
-            velocity = np.array(turned(sample.quaternion, velocity))
+            velocity = turned(sample.quaternion, sample.velocity)
         if not self._track:
             return 0j
         before_us, before, _ = self._track[-1]

@@ -53,14 +53,13 @@ NUMBERS: dict[type[Any], tuple[str, ...]] = {
 
 
 def _places(
-    fields: dict[type[Any], dict[str, Shape]],
-) -> dict[type[Any], tuple[tuple[int, Shape], ...]]:
-    return {kind: tuple((kind._fields.index(name), shape) for name, shape in shapes.items())
-            for kind, shapes in fields.items()}
+    kind: type[Any], arrays: dict[type[Any], dict[str, Shape]],
+) -> tuple[tuple[int, Shape], ...]:
+    return tuple((kind._fields.index(name), shape)
+                 for name, shape in arrays.get(kind, {}).items())
 
 
-_MEASURED, _PERHAPS = _places(MEASURED), _places(PERHAPS_MEASURED)
-_CHECKS = {kind: (_MEASURED.get(kind, ()), _PERHAPS.get(kind, ()),
+_CHECKS = {kind: (_places(kind, MEASURED), _places(kind, PERHAPS_MEASURED),
                   tuple(kind._fields.index(name) for name in NUMBERS.get(kind, ())))
            for kind in (*MEASURED, *PERHAPS_MEASURED, *NUMBERS)}
 _NOTHING: tuple[Any, Any, Any] = (), (), ()

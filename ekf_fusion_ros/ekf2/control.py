@@ -170,9 +170,7 @@ class Control:
     def correct_bank(self) -> None:
         """Let the yaw bank use its velocity, and offer it that of a new fix for the next step."""
         f = self._f
-        in_air = f.flags.in_air
-        if self.bank.pending or not in_air:
-            self.bank.correct(f.imu.increments, in_air, f.x, f.dt_avg)
+        self.bank.correct(f.imu.increments, f.flags.in_air, f.x, f.dt_avg)
         fix = f.fix
         if self.gnss.popped and fix is not None and fix.has_velocity and fix.vacc > 0.0:
             self.bank.set_velocity(fix.velocity, fix.vacc)

@@ -29,7 +29,7 @@ class YawEstimator:
     """Five attitude references with evenly spaced yaw, each with a 3-state velocity-yaw EKF.
 
     Their weights follow the likelihood of the velocity innovations; yaw and variance are those of
-    the weighted sum. `pending`: in flight, too, `correct` has something to do.
+    the weighted sum.
     """
 
     def __init__(self) -> None:
@@ -46,20 +46,17 @@ class YawEstimator:
         self._accel: Array = models['accel']
         self._tilt_aligned = False
         self._running = False
-        self.pending = True
         self._velocity: Array | None = None
         self._accuracy = 0.0
 
     def restart(self) -> None:
         """Find tilt and yaw anew."""
         self._tilt_aligned = False
-        self.pending = True
         self.models['tilt_aligned'] = False
         self._run(False)
 
     def set_velocity(self, velocity: Array, accuracy: float) -> None:
         """Offer a NE velocity (2,) and its 1-sigma accuracy, m/s, to the next step."""
-        self.pending = True
         self._velocity = velocity[0:2].copy()
         self._accuracy = accuracy
 
@@ -77,7 +74,6 @@ class YawEstimator:
         if not self._tilt_aligned:
             self._align_tilt(imu)
             return
-        self.pending = False
         velocity, self._velocity = self._velocity, None
         if not airborne:
             if self._running:

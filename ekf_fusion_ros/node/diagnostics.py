@@ -73,16 +73,15 @@ class UpdaterDiagnostics:
         self._updater.timer.cancel()
         self._updater.setHardwareID(node.get_namespace().strip('/') or NO_HARDWARE)
         self._reports: dict[str, Report] = {}
-        self._subjects: set[str] = set()
 
     def publish(self, reports: Iterable[Report]) -> None:
         """Publish reports, stamped by the node's clock."""
-        self._reports = {report.subject: report for report in reports}
-        for subject in self._subjects - self._reports.keys():
+        before, self._reports = self._reports, {report.subject: report for report in reports}
+        for subject in before.keys() - self._reports.keys():
             self._updater.removeByName(subject)
-        for subject in [one for one in self._reports if one not in self._subjects]:
-            self._updater.add(subject, self._fill)
-        self._subjects = set(self._reports)
+        for subject in self._reports:
+            if subject not in before:
+                self._updater.add(subject, self._fill)
         self._updater.force_update()
 
     def _fill(self, status: Any) -> Any:

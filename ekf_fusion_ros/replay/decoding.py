@@ -36,7 +36,7 @@ class BatchDecoder:
 
     def decode(self, batch: Sequence[Message]) -> list[Decoded]:
         """Return role and sample, or Refused, of each message in their order."""
-        places: dict[str, list[int]] = {name: [] for name in self.names}
+        places: dict[str, list[int]] = {name: [] for name in self._decoders}
         for place, message in enumerate(batch):
             places[message[1]].append(place)
         decoded: list[Any] = [None] * len(batch)
