@@ -18,6 +18,7 @@ from ekf_fusion_ros.messages.flat import FlatRows
 from ekf_fusion_ros.messages.flat import elements
 from ekf_fusion_ros.messages.flat import flat_message
 from ekf_fusion_ros.messages.flat import named
+from ekf_fusion_ros.messages.flat import where_good
 from ekf_fusion_ros.messages.flat import xyz
 from ekf_fusion_ros.messages.flat import xyzw
 from ekf_fusion_ros.messages.mounting import body_to_sensor_quaternion
@@ -114,8 +115,7 @@ def decode_imu_rows(rows: FlatRows, params: MessageParams) -> list[ImuReading | 
         stamps, angles, velocities, dt, dt, repeat(NO_CLIPPING), orientations, strict=False))
     readings = named(ImuReading, zip(
         stamps, rates, forces, orientations, increments, [-1, *stamps[:-1]], strict=True))
-    return [reading if plain else None
-            for plain, reading in zip(good.tolist(), readings, strict=True)]
+    return where_good(readings, good)
 
 
 def _flat(message: Any) -> FlatMessage:

@@ -11,6 +11,7 @@ from ekf_fusion_ros.messages.flat import FlatMessage
 from ekf_fusion_ros.messages.flat import FlatRows
 from ekf_fusion_ros.messages.flat import elements
 from ekf_fusion_ros.messages.flat import flat_message
+from ekf_fusion_ros.messages.flat import where_good
 from ekf_fusion_ros.messages.flat import xyz
 from ekf_fusion_ros.messages.mounting import turned_to_body
 from ekf_fusion_ros.messages.refusal import Refused
@@ -49,8 +50,7 @@ def decode_magnetic_field_rows(rows: FlatRows, params: MessageParams) -> list[Ma
     good &= (columns[COVARIANCE][::4] >= 0.0).all(axis=0)
     field = GAUSS_PER_TESLA * np.stack(
         turned_to_body(np.where(good, tesla, 0.0), limits.mount_rpy, rows.frame_id), axis=1)
-    return [MagSample(time_us, row) if plain else None for plain, time_us, row in zip(
-        good.tolist(), times.tolist(), field, strict=True)]
+    return where_good(map(MagSample, times.tolist(), field), good)
 
 
 def _flat(message: Any) -> FlatMessage:

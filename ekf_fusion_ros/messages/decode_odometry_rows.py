@@ -22,6 +22,7 @@ from ekf_fusion_ros.messages.decode_odometry import parent_kind
 from ekf_fusion_ros.messages.fields import CORRELATION_MAX
 from ekf_fusion_ros.messages.fields import QUATERNION_NORM_ERROR
 from ekf_fusion_ros.messages.flat import FlatRows
+from ekf_fusion_ros.messages.flat import where_good
 from ekf_fusion_ros.messages.mounting import turned_to_body
 from ekf_fusion_ros.messages.refusal import Refused
 from ekf_fusion_ros.messages.stamps import plain_stamps
@@ -62,8 +63,7 @@ def decode_odometry_rows(
         positions, quaternions, velocities, position_vars, velocity_covs))
     samples = map(VisionSample, times.tolist(), *vectors, angular_vars.tolist(),
                   repeat(VelocityFrame.BODY_FRD))
-    return [sample if plain else None
-            for plain, sample in zip(good.tolist(), samples, strict=True)]
+    return where_good(samples, good)
 
 
 def _positions(

@@ -63,6 +63,16 @@ def named(kind: type[Record], rows: Iterable[tuple[Any, ...]]) -> Iterator[Recor
     return map(partial(tuple.__new__, kind), rows)
 
 
+def where_good(
+    samples: Iterable[Record], good: NDArray[np.bool_],
+) -> list[Record | None]:
+    """Return samples as a list, with None in place of those that are not good."""
+    if good.all():
+        return list(samples)
+    return [sample if plain else None
+            for plain, sample in zip(good.tolist(), samples, strict=True)]
+
+
 def flat_message(message: Any, numbers: Sequence[float], child_frame_id: str = '') -> FlatMessage:
     """Return the numbers of a message under its header."""
     header = message.header

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Iterable
 from collections.abc import Mapping
 from collections.abc import Sequence
 from itertools import repeat
+from operator import itemgetter
 from typing import Any
 
 from ekf_fusion_ros.messages.flat import FlatMessage
@@ -21,6 +23,7 @@ from ekf_fusion_ros.replay.withholding import Withholding
 from ekf_fusion_ros.session import FusionSession
 
 Decoded = tuple[str, Any]
+_DATA = itemgetter(2)
 
 
 class BatchDecoder:
@@ -36,29 +39,27 @@ class BatchDecoder:
 
     def decode(self, batch: Sequence[Message]) -> list[Decoded]:
         """Return role and sample, or Refused, of each message in their order."""
-        places: dict[str, list[int]] = {name: [] for name in self._decoders}
-        for place, message in enumerate(batch):
-            places[message[1]].append(place)
-        decoded: list[Any] = [None] * len(batch)
-        for name, ours in places.items():
-            found = self._decoders[name]([batch[place] for place in ours])
-            for place, one in zip(ours, found, strict=True):
-                decoded[place] = one
-        return decoded
+        messages: dict[str, list[Message]] = {name: [] for name in self._decoders}
+        for message in batch:
+            messages[message[1]].append(message)
+        decoded = {name: iter(decode(messages[name])) for name, decode in self._decoders.items()}
+        return [next(decoded[name]) for _, name, _ in batch]
 
 
 def _decoder_of_many(
     role: str, kind: str, session: FusionSession, withholding: Withholding,
-) -> Callable[[Sequence[Message]], list[Decoded]]:
+) -> Callable[[Sequence[Message]], Iterable[Decoded]]:
     """Return what turns messages of a topic into its role and a sample or Refused each."""
     one = _decoder(role, kind, session, withholding)
     decode_rows = session.rows_decoder(role)
     if kind not in TABLES or role in withholding.roles or decode_rows is None:
         return lambda messages: [one(data, time_ns) for time_ns, _, data in messages]
 
-    def decoded(messages: Sequence[Message]) -> list[Decoded]:
-        rows = _rows(kind, [data for _, _, data in messages])
-        samples = repeat(None, len(messages)) if rows is None else decode_rows(rows)
+    def decoded(messages: Sequence[Message]) -> Iterable[Decoded]:
+        rows = _rows(kind, list(map(_DATA, messages)))
+        samples = [None] * len(messages) if rows is None else decode_rows(rows)
+        if None not in samples:
+            return zip(repeat(role), samples)
         return [one(data, time_ns) if sample is None else (role, sample)
                 for (time_ns, _, data), sample in zip(messages, samples, strict=True)]
 
