@@ -63,9 +63,7 @@ def named(kind: type[Record], rows: Iterable[tuple[Any, ...]]) -> Iterator[Recor
     return map(partial(tuple.__new__, kind), rows)
 
 
-def where_good(
-    samples: Iterable[Record], good: NDArray[np.bool_],
-) -> list[Record | None]:
+def where_good(samples: Iterable[Record], good: NDArray[np.bool_]) -> list[Record | None]:
     """Return samples as a list, with None in place of those that are not good."""
     if good.all():
         return list(samples)

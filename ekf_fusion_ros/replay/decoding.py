@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from collections.abc import Mapping
 from collections.abc import Sequence
 from itertools import repeat
-from operator import itemgetter
 from typing import Any
 
 from ekf_fusion_ros.messages.flat import FlatMessage
@@ -23,7 +22,6 @@ from ekf_fusion_ros.replay.withholding import Withholding
 from ekf_fusion_ros.session import FusionSession
 
 Decoded = tuple[str, Any]
-_DATA = itemgetter(2)
 
 
 class BatchDecoder:
@@ -56,7 +54,7 @@ def _decoder_of_many(
         return lambda messages: [one(data, time_ns) for time_ns, _, data in messages]
 
     def decoded(messages: Sequence[Message]) -> Iterable[Decoded]:
-        rows = _rows(kind, list(map(_DATA, messages)))
+        rows = _rows(kind, [data for _, _, data in messages])
         samples = [None] * len(messages) if rows is None else decode_rows(rows)
         if None not in samples:
             return zip(repeat(role), samples)
