@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from collections.abc import Sequence
 from dataclasses import dataclass
 import math
@@ -27,6 +28,9 @@ SECOND = 1_000_000
 MIN_POINTS = 5
 HISTORY_US = 10 * SECOND
 CONFIRMATIONS = 3
+
+Held = Callable[[], tuple[float, float] | None]
+"""Gives a yaw as in HeadingFit and its sigma, rad; None where none is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +93,6 @@ class MotionHeading:
         self._reset_counter: int | None = None
         self._fit: HeadingFit | None = None
         self._announced = math.inf
-        self._held: tuple[float, float] | None = None
         self._contradictions = 0
 
     def push_odometry(self, sample: VisionSample, *, jumped: bool = False) -> None:
@@ -133,10 +136,6 @@ class MotionHeading:
         dt = (sample.time_us - before_us) / SECOND
         return before + dt * complex(velocity[0], velocity[1])
 
-    def hold(self, yaw: float, sigma: float) -> None:
-        """Note the heading of the odometry frame that the filter holds, rad as in HeadingFit."""
-        self._held = (yaw, sigma)
-
     def given(self, sigma: float) -> None:
         """Note that the heading in use was given from outside with a sigma in rad.
 
@@ -144,8 +143,11 @@ class MotionHeading:
         """
         self._announced = min(self._announced, sigma)
 
-    def push_fix(self, sample: GnssSample) -> HeadingSample | None:
-        """Take a fix; return a heading when there is one to announce."""
+    def push_fix(self, sample: GnssSample, held: Held = lambda: None) -> HeadingSample | None:
+        """Take a fix; return a heading when there is one to announce.
+
+        `held` returns the heading of the odometry frame that the filter holds.
+        """
         if self._projection is None:
             self._projection = Wgs84Projection(sample.lat, sample.lon, sample.alt)
         place = complex(*self._projection.project(sample.lat, sample.lon))
@@ -154,7 +156,7 @@ class MotionHeading:
         announced = None
         while self._pending and self._track and self._pending[0][0] <= self._track[-1][0]:
             if self._take(*self._pending.popleft()):
-                announced = self._announcement() or announced
+                announced = self._announcement(held) or announced
         return announced
 
     def status(self) -> HeadingStatus:
@@ -275,27 +277,28 @@ class MotionHeading:
 
     # -- announcements -------------------------------------------------------------------------
 
-    def _announcement(self) -> HeadingSample | None:
+    def _announcement(self, held: Held) -> HeadingSample | None:
         fit = self._fit
         if fit is None or not self._consistent(fit):
             return None
         params = self._params
         wanted = fit.sigma < params.announce_sigma and math.isinf(self._announced)
         wanted |= fit.sigma < params.refine_sigma < self._announced
-        if not wanted and not self._contradicted(fit):
+        if not wanted and not self._contradicted(fit, held):
             return None
         self._announced = fit.sigma
         self._contradictions = 0
         return HeadingSample(fit.time_us, fit.yaw, fit.sigma ** 2)
 
-    def _contradicted(self, fit: HeadingFit) -> bool:
+    def _contradicted(self, fit: HeadingFit, held: Held) -> bool:
         """True once the fit has contradicted the heading in use several times in a row."""
-        if self._held is None or math.isinf(self._announced):
+        in_use = None if math.isinf(self._announced) else held()
+        if in_use is None:
             return False
-        held, sigma = self._held
+        yaw, sigma = in_use
         limit = max(self._params.watch_gate * math.hypot(sigma, fit.sigma),
                     self._params.watch_angle)
-        apart = abs(wrap_pi(fit.yaw - held)) > limit and fit.sigma < self._params.announce_sigma
+        apart = abs(wrap_pi(fit.yaw - yaw)) > limit and fit.sigma < self._params.announce_sigma
         self._contradictions = self._contradictions + 1 if apart else 0
         return self._contradictions >= CONFIRMATIONS
 

@@ -367,15 +367,16 @@ class FusionSession:
         self._estimator.push(fix)
         if self._motion is None:
             return
-        held = self.alignment()
-        if held is not None:
-            self._motion.hold(-held[0], held[1])
-        heading = self._motion.push_fix(fix)
+        heading = self._motion.push_fix(fix, self._held_heading)
         if heading is not None:
             self._estimator.push(heading)
         drift = None if self._drift is None else self._drift.news(fix.time_us)
         if drift is not None:
             self._estimator.push(drift)
+
+    def _held_heading(self) -> tuple[float, float] | None:
+        alignment = self.alignment()
+        return None if alignment is None else (-alignment[0], alignment[1])
 
     def _run(self, role: str, reading: Any) -> list[FusedOutput]:
         """Step through the increments that end with a message of the inertial role."""

@@ -53,10 +53,8 @@ def drive(heading, yaw, duration, *, speed=1.0, eph=1.0, error=None, scale=1.0, 
         heading.push_odometry(
             VisionSample(stamp, np.array((track[k].real, track[k].imag, 0.0)), NAN4))
         if k % step == 0:
-            if held is not None:
-                heading.hold(*held)
             lat, lon = places[k // step]
-            found = heading.push_fix(GnssSample(stamp, lat, lon, 0.0, eph, 1.0))
+            found = heading.push_fix(GnssSample(stamp, lat, lon, 0.0, eph, 1.0), lambda: held)
             if found is not None:
                 announced.append(found)
     return announced

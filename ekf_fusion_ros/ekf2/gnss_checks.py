@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
-
-import numpy as np
-from numpy.typing import NDArray
 
 from ekf_fusion_ros.ekf2.filter import Filter
 from ekf_fusion_ros.ekf2.state import SECOND
 from ekf_fusion_ros.geo.projection import Projection
 from ekf_fusion_ros.geo.projection import make_projection
 from ekf_fusion_ros.samples import GnssSample
-
-Array = NDArray[np.float64]
 
 FILTER_TIME = 10.0
 """Time constant in s of the drift filters."""
@@ -35,6 +31,23 @@ class CheckResult:
     limit: float = math.nan
 
 
+class _LimitedMean:
+    """Low-pass filtered components, each input of which is limited."""
+
+    def __init__(self, size: int) -> None:
+        self.mean = [0.0] * size
+
+    def follow(self, values: Sequence[float], limits: Sequence[float], share: float) -> None:
+        """Move by a share towards values, limited to INPUT_LIMIT times their limits."""
+        for k, (value, limit) in enumerate(zip(values, limits, strict=True)):
+            bound = INPUT_LIMIT * limit
+            self.mean[k] += share * (min(max(value, -bound), bound) - self.mean[k])
+
+    def forget(self) -> None:
+        """Begin again at zero."""
+        self.mean = [0.0] * len(self.mean)
+
+
 class GnssChecks:
     """Runs at the arrival of every fix; a check that the fix cannot feed is skipped."""
 
@@ -48,9 +61,9 @@ class GnssChecks:
         self.last_pass_us = 0
         self._previous: GnssSample | None = None
         self._previous_us = 0
-        self._drift = np.zeros(3)
-        self._speed = np.zeros(2)
-        self._climb = 0.0
+        self._drift = _LimitedMean(3)
+        self._speed = _LimitedMean(2)
+        self._climb = _LimitedMean(1)
         self._ran = False
 
     @property
@@ -126,27 +139,25 @@ class GnssChecks:
         if fix.has_velocity:
             limit = f.params.gnss.checks.req_vdrift
             difference = float(fix.velocity[2] - f.x[6])
-            clamped = min(max(difference, -INPUT_LIMIT * limit), INPUT_LIMIT * limit)
-            self._climb += share * (clamped - self._climb)
-            self._judge_above('vspeed', abs(self._climb), limit)
+            self._climb.follow((difference,), (limit,), share)
+            self._judge_above('vspeed', abs(self._climb.mean[0]), limit)
         self._previous = fix
         self._previous_us = f.t_now
 
     def _drift_at_rest(self, fix: GnssSample, dt: float, share: float) -> None:
         limits = self._f.params.gnss.checks
-        bound = INPUT_LIMIT * np.array((limits.req_hdrift, limits.req_hdrift, limits.req_vdrift))
-        displacement = np.zeros(3)
+        north = east = down = 0.0
         if self._previous is not None:
-            displacement[0:2] = self._around_previous().project(fix.lat, fix.lon)
-            displacement[2] = self._previous.alt - fix.alt
-        velocity = np.clip(displacement / dt, -bound, bound)
-        self._drift += share * (velocity - self._drift)
-        self._judge_above('hdrift', math.hypot(*self._drift[0:2]), limits.req_hdrift)
-        self._judge_above('vdrift', abs(float(self._drift[2])), limits.req_vdrift)
+            north, east = self._around_previous().project(fix.lat, fix.lon)
+            down = self._previous.alt - fix.alt
+        horizontal, vertical = limits.req_hdrift, limits.req_vdrift
+        drift = self._drift
+        drift.follow((north / dt, east / dt, down / dt), (horizontal, horizontal, vertical), share)
+        self._judge_above('hdrift', math.hypot(*drift.mean[0:2]), horizontal)
+        self._judge_above('vdrift', abs(drift.mean[2]), vertical)
         if fix.has_velocity:
-            speed = np.clip(fix.velocity[0:2], -bound[0:2], bound[0:2])
-            self._speed += share * (speed - self._speed)
-            self._judge_above('hspeed', math.hypot(*self._speed), limits.req_hdrift)
+            self._speed.follow(fix.velocity[0:2].tolist(), (horizontal, horizontal), share)
+            self._judge_above('hspeed', math.hypot(*self._speed.mean), horizontal)
 
     def _around_previous(self) -> Projection:
         assert self._previous is not None
@@ -154,8 +165,8 @@ class GnssChecks:
         return make_projection(name, self._previous.lat, self._previous.lon)
 
     def _forget_drift(self) -> None:
-        self._drift[:] = 0.0
-        self._speed[:] = 0.0
+        self._drift.forget()
+        self._speed.forget()
 
     def _stamp(self) -> None:
         """Note the time of the verdict."""

@@ -12,6 +12,15 @@ from ekf_fusion_ros.ekf2.state import WIND
 from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import HealthLevel
 from ekf_fusion_ros.estimator import NavState
+from ekf_fusion_ros.kernels.navigation import ACCEL_BIAS
+from ekf_fusion_ros.kernels.navigation import ACCELERATION
+from ekf_fusion_ros.kernels.navigation import GYRO_BIAS
+from ekf_fusion_ros.kernels.navigation import POSE_COVARIANCE
+from ekf_fusion_ros.kernels.navigation import POSITION
+from ekf_fusion_ros.kernels.navigation import QUATERNION
+from ekf_fusion_ros.kernels.navigation import RATE
+from ekf_fusion_ros.kernels.navigation import VELOCITY
+from ekf_fusion_ros.kernels.navigation import VELOCITY_COVARIANCE
 from ekf_fusion_ros.params.ekf2 import ZERO
 
 if TYPE_CHECKING:
@@ -27,11 +36,12 @@ def nav_state(ekf: Ekf2) -> NavState:
     out = f.output
     p = f.cov.p
     row = out.navigation(f.x, p, f.dt_avg)
-    velocity, position = row[4:7], row[7:10]
+    velocity, position = row[VELOCITY], row[POSITION]
     if ekf.params.imu.position != ZERO:
         lever = np.asarray(ekf.params.imu.position)
         velocity, position = out.velocity_at_origin(lever), out.position_at_origin(lever)
-    pose_cov, velocity_cov = row[22:58].reshape(6, 6), row[58:67].reshape(3, 3)
+    pose_cov = row[POSE_COVARIANCE].reshape(6, 6)
+    velocity_cov = row[VELOCITY_COVARIANCE].reshape(3, 3)
     if ekf.lapse.ahead:
         ekf.lapse.widen(pose_cov, velocity_cov)
     validity = ekf.control.validity
@@ -39,14 +49,14 @@ def nav_state(ekf: Ekf2) -> NavState:
     wind = f.flags.wind
     return NavState(
         time_us=f.t_now,
-        quaternion=row[0:4],
+        quaternion=row[QUATERNION],
         velocity=velocity,
         position=position,
-        angular_rate=row[10:13],
+        angular_rate=row[RATE],
         pose_cov=pose_cov,
         velocity_cov=velocity_cov,
-        gyro_bias=row[16:19],
-        accel_bias=row[19:22],
+        gyro_bias=row[GYRO_BIAS],
+        accel_bias=row[ACCEL_BIAS],
         origin=f.earth.origin,
         yaw_aligned=f.flags.yaw_align,
         dead_reckoning=f.dead_reckoning,
@@ -55,7 +65,7 @@ def nav_state(ekf: Ekf2) -> NavState:
         gnss_started=f.observations.gps_hor_pos.starts > 0,
         in_air=f.flags.in_air,
         yaw_jump=ekf.control.resets.counters.yaw_sum,
-        acceleration=row[13:16],
+        acceleration=row[ACCELERATION],
         wind=f.x[WIND].copy() if wind else None,
         wind_cov=p[WIND, WIND].copy() if wind else None,
         ground_down=terrain.ground_down() if terrain.valid else None,

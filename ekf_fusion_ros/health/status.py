@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from collections.abc import Mapping
-from dataclasses import dataclass
 import math
+from typing import NamedTuple
 
 from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import HealthLevel
@@ -21,8 +21,7 @@ UNITS = {'global position': 'm', 'local position': 'm', 'local velocity': 'm/s'}
 FLAGS = tuple(UNITS)
 
 
-@dataclass(frozen=True, slots=True)
-class NavigationStatus:
+class NavigationStatus(NamedTuple):
     """Health at `time_us`, before the first step all invalid.
 
     missing: what home waits for, empty where it could be set. ready: the vehicle may be armed, by

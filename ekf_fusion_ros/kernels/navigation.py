@@ -11,6 +11,12 @@ Array = NDArray[np.float64]
 SIZE = 67
 """Numbers of one state."""
 
+QUATERNION, VELOCITY, POSITION = slice(0, 4), slice(4, 7), slice(7, 10)
+RATE, ACCELERATION = slice(10, 13), slice(13, 16)
+GYRO_BIAS, ACCEL_BIAS = slice(16, 19), slice(19, 22)
+POSE_COVARIANCE, VELOCITY_COVARIANCE = slice(22, 58), slice(58, 67)
+"""Where they are in a row; the covariances row by row."""
+
 
 @kernel
 def attitude_error_jacobian(q: Array) -> Array:
@@ -26,14 +32,28 @@ def attitude_error_jacobian(q: Array) -> Array:
 @kernel
 def pose_covariance(x: Array, p: Array) -> Array:
     """Return (6, 6) of states and covariance: position NED, then rotations about earth axes."""
-    jacobian = attitude_error_jacobian(x)
     covariance = np.empty((6, 6))
-    covariance[0:3, 0:3] = p[7:10, 7:10]
-    turned = np.dot(jacobian, np.ascontiguousarray(p[0:4, 0:10]))
-    covariance[3:6, 0:3] = turned[:, 7:10]
-    covariance[0:3, 3:6] = turned[:, 7:10].T
-    covariance[3:6, 3:6] = np.dot(np.ascontiguousarray(turned[:, 0:4]), jacobian.T)
+    fill_pose_covariance(x, p, covariance)
     return covariance
+
+
+@kernel
+def fill_pose_covariance(x: Array, p: Array, covariance: Array) -> None:
+    """Write pose_covariance(x, p) into covariance (6, 6)."""
+    jacobian = attitude_error_jacobian(x)
+    turned = np.empty(4)
+    for i in range(3):
+        a, b, c, d = jacobian[i]
+        for j in range(3):
+            covariance[i, j] = p[7 + i, 7 + j]
+            shared = a * p[0, 7 + j] + b * p[1, 7 + j] + c * p[2, 7 + j] + d * p[3, 7 + j]
+            covariance[3 + i, j] = covariance[j, 3 + i] = shared
+        for j in range(4):
+            turned[j] = a * p[0, j] + b * p[1, j] + c * p[2, j] + d * p[3, j]
+        for j in range(3):
+            covariance[3 + i, 3 + j] = (
+                turned[0] * jacobian[j, 0] + turned[1] * jacobian[j, 1]
+                + turned[2] * jacobian[j, 2] + turned[3] * jacobian[j, 3])
 
 
 @kernel
@@ -50,6 +70,5 @@ def navigation(
     row[13:16] = s['acceleration']
     row[16:22] = x[10:16] / dt_avg
     row[10:13] = s['rate'] - row[16:19]
-    row[22:58] = pose_covariance(x, p).ravel()
-    for i in range(3):
-        row[58 + 3 * i:61 + 3 * i] = p[4 + i, 4:7]
+    fill_pose_covariance(x, p, row[22:58].reshape(6, 6))
+    row[58:67].reshape(3, 3)[:] = p[4:7, 4:7]

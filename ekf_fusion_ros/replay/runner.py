@@ -176,6 +176,9 @@ class _Run:
                 if sink is not None:
                     stack.callback(sink.close)
             stack.callback(self._flush)
+            # The usual threshold walks the tuples of a batch several times while they wait.
+            stack.callback(gc.set_threshold, *gc.get_threshold())
+            gc.set_threshold(10 * BATCH)
             for outputs in steps:
                 for output in outputs:
                     self._write(output)
