@@ -72,6 +72,7 @@ from ekf_fusion_ros.stamp_order import Step
 from ekf_fusion_ros.stamp_order import check_advance
 from ekf_fusion_ros.statistics import RoleStatistics
 from ekf_fusion_ros.statistics import note_milestones
+from ekf_fusion_ros.turn_check import TurnCheck
 from ekf_fusion_ros.twist_check import TwistCheck
 
 if TYPE_CHECKING:
@@ -155,7 +156,8 @@ class FusionSession:
             role: AidingOrder(lead_us, age_limit_us(self.params, role)) for role in roles}
         self._rates = SensorRates(minimum_rates(self.params.ekf2, frozenset(roles)))
         self._heading = OdometryHeading()
-        self._down = DownCheck(both=IMU in roles and ODOMETRY in roles)
+        self._down = DownCheck(imu=IMU in roles)
+        self._turn = TurnCheck(imu=IMU in roles)
         self._twist = TwistCheck()
         self._holding = Holding(round(1000 * session.hold_ms))
         self._completion = Completion(self.params.messages)
@@ -335,6 +337,8 @@ class FusionSession:
         elif role == ODOMETRY:
             self._push_odometry(sample)
         else:
+            if role == MAGNETIC_FIELD and self._turn.open and self._turn.note_field(sample):
+                self._tell(sample.time_us, self._turn.sentence)
             self._estimator.push(self._completion.sample(sample))
 
     def _tell_landed(self) -> None:
@@ -346,6 +350,8 @@ class FusionSession:
         self._heading.push(sample)
         if self._down.open:
             self._down.note_odometry(sample)
+        if self._turn.open and self._turn.note_odometry(sample):
+            self._tell(sample.time_us, self._turn.sentence)
         jump = '' if self._inertial is None else self._inertial.jump()
         if jump:
             self._tell(sample.time_us, jump)
@@ -385,6 +391,8 @@ class FusionSession:
         increments = self._inertial.push(reading)
         if self._down.open and self._down.note_imu(increments):
             self._tell(reading.time_us, self._down.sentence)
+        if self._turn.open:
+            self._turn.note_imu(increments)
         if role == ODOMETRY:
             self._push_odometry(reading)
         holding, intake = self._holding, self._intake
@@ -583,7 +591,7 @@ class FusionSession:
         lack = self._heading.lack if self._inertial_role == ODOMETRY else ''
         blind = NO_MOTION if self._local and self.roles is not None \
             and not self.roles & TELL_MOTION else ''
-        said = (self._down.sentence, self._twist.sentence, lack, blind)
+        said = (self._down.sentence, self._turn.sentence, self._twist.sentence, lack, blind)
         return [*self._rates.slow(), *filter(None, said)]
 
     def receivers(self) -> Sequence[ReceiverStatus]:
@@ -611,7 +619,7 @@ class FusionSession:
         if role:
             return f'waiting for {role}: {self._statistics[role].summary()}'
         nav = self._estimator.nav_state()
-        if nav is not None and nav.yaw_aligned:
+        if nav is None or nav.yaw_aligned:
             return ''
         missing = self._missing_for_yaw()
         if missing or self._motion is None:
@@ -625,9 +633,7 @@ class FusionSession:
             return ''
         add = f'add a topic of {", ".join(sorted(YAW_WITHOUT_ODOMETRY))}'
         if ODOMETRY not in roles:
-            no_attitude = self._estimator.nav_state() is None
-            return '' if no_attitude else (
-                f'the yaw cannot be aligned: the fixes have no velocity; {add} or odometry')
+            return f'the yaw cannot be aligned: the fixes have no velocity; {add} or odometry'
         if not self._heading.known or self._heading.has_attitude:
             return ''
         return ('the yaw cannot be aligned: the odometry has no orientation; '

@@ -25,7 +25,7 @@ LAYERS = (
         'session', 'airspeed_conditions', 'completion', 'down_check', 'fix_assembly',
         'fix_intake', 'fused_output', 'holding', 'inputs', 'map_origin', 'navigation_watch',
         'odometry_heading', 'pairing', 'roles', 'sample_check', 'sensor_rates', 'stamp_order',
-        'statistics', 'twist_check', 'warm_up',
+        'statistics', 'turn_check', 'twist_check', 'warm_up',
     ),
     ('live',),
     ('analysis',),

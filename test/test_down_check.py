@@ -37,7 +37,7 @@ def at_rest(roll, seconds):
 @pytest.mark.parametrize(('imu', 'odometry', 'degrees'), [
     (0.5 * math.pi, 0.0, 90), (math.pi, 0.0, 180), (0.0, -0.6, 34)])
 def test_a_sensor_that_sits_turned_is_told_once(imu, odometry, degrees):
-    check = DownCheck(both=True)
+    check = DownCheck(imu=True)
     check.note_odometry(rolled(odometry))
     assert not check.note_imu(at_rest(imu, 9.9))
     assert check.note_imu(at_rest(imu, 0.2))
@@ -48,7 +48,7 @@ def test_a_sensor_that_sits_turned_is_told_once(imu, odometry, degrees):
 
 @pytest.mark.parametrize(('imu', 'odometry'), [(0.0, 0.0), (1.2, 1.2), (0.4, 0.0)])
 def test_a_tilted_body_is_no_turned_sensor(imu, odometry):
-    check = DownCheck(both=True)
+    check = DownCheck(imu=True)
     check.note_odometry(rolled(odometry))
     assert not check.note_imu(at_rest(imu, 10.1))
     assert not check.open
@@ -56,10 +56,47 @@ def test_a_tilted_body_is_no_turned_sensor(imu, odometry):
 
 
 def test_odometry_without_attitude_says_nothing():
-    check = DownCheck(both=True)
+    check = DownCheck(imu=True)
     check.note_odometry(VisionSample(0, NAN3, NAN4))
     assert not check.note_imu(at_rest(1.5, 10.1))
     assert check.sentence == ''
+
+
+@pytest.mark.parametrize(('roll', 'told'), [
+    (0.0, False), (1.5, False), (2.0, False), (3.0, True), (-3.0, True)])
+def test_without_an_attitude_only_a_vehicle_upside_down_is_told(roll, told):
+    check = DownCheck(imu=True)
+    assert check.note_imu(at_rest(roll, 10.1)) == told
+    assert ('upside down' in check.sentence) == told
+
+
+@pytest.mark.parametrize('states_attitude', [False, True])
+@pytest.mark.parametrize(('share', 'words'), [
+    (1.0 / 9.81, 'feels 1.0 m/s^2'), (0.0, 'feels 0.0 m/s^2'), (9.81, 'feels 96.2 m/s^2')])
+def test_a_specific_force_that_is_not_gravity_is_told(share, words, states_attitude):
+    check = DownCheck(imu=True)
+    if states_attitude:
+        check.note_odometry(rolled(0.0))
+    assert check.note_imu([
+        imu._replace(delta_velocity=share * imu.delta_velocity) for imu in at_rest(0.0, 10.1)])
+    assert words in check.sentence
+
+
+def test_without_gravity_the_reason_is_told_not_what_comes_later():
+    """Nothing starts then; to drive on would not help."""
+    roles = ('odometry', 'fix', 'imu')
+    flight = Scenario(
+        trajectory=Flight(duration=25.0, height=15.0), sensors=default_sensors(roles), seed=1)
+    session = FusionSession(Params(), list(roles))
+    for arrival in flight.arrivals():
+        sample = arrival.sample
+        if isinstance(sample, ImuSample):
+            sample = sample._replace(delta_velocity=sample.delta_velocity / 9.81)
+        session.push(sample)
+    text = session.health().text
+    assert text.startswith('gathering samples for the initial alignment')
+    assert 'the specific force is 1.0 m/s^2' in text
+    assert 'yaw' not in text
 
 
 @pytest.mark.parametrize('turned', [False, True])
