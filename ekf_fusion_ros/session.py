@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from collections.abc import Collection
+from collections.abc import Iterable
 from collections.abc import Mapping
 from collections.abc import Sequence
 import math
@@ -13,7 +14,6 @@ from typing import Any
 
 from ekf_fusion_ros.airspeed_conditions import check_airspeed
 from ekf_fusion_ros.completion import Completion
-from ekf_fusion_ros.down_check import DownCheck
 from ekf_fusion_ros.estimator import YAW_KNOWN_VARIANCE
 from ekf_fusion_ros.estimator import Estimator
 from ekf_fusion_ros.estimator import Event
@@ -26,6 +26,7 @@ from ekf_fusion_ros.fix_intake import FixIntake
 from ekf_fusion_ros.fused_output import FusedOutput
 from ekf_fusion_ros.health.status import NavigationStatus
 from ekf_fusion_ros.holding import Holding
+from ekf_fusion_ros.input_checks import InputChecks
 from ekf_fusion_ros.inputs import ROLE_OF_SAMPLE
 from ekf_fusion_ros.inputs import InertialInput
 from ekf_fusion_ros.inputs import adopt_params
@@ -72,8 +73,6 @@ from ekf_fusion_ros.stamp_order import Step
 from ekf_fusion_ros.stamp_order import check_advance
 from ekf_fusion_ros.statistics import RoleStatistics
 from ekf_fusion_ros.statistics import note_milestones
-from ekf_fusion_ros.turn_check import TurnCheck
-from ekf_fusion_ros.twist_check import TwistCheck
 
 if TYPE_CHECKING:
     from ekf_fusion_ros.params.tree import Params
@@ -156,9 +155,7 @@ class FusionSession:
             role: AidingOrder(lead_us, age_limit_us(self.params, role)) for role in roles}
         self._rates = SensorRates(minimum_rates(self.params.ekf2, frozenset(roles)))
         self._heading = OdometryHeading()
-        self._down = DownCheck(imu=IMU in roles)
-        self._turn = TurnCheck(imu=IMU in roles)
-        self._twist = TwistCheck()
+        self._checks = InputChecks(imu=IMU in roles)
         self._holding = Holding(round(1000 * session.hold_ms))
         self._completion = Completion(self.params.messages)
         self._intake = FixIntake(
@@ -337,8 +334,8 @@ class FusionSession:
         elif role == ODOMETRY:
             self._push_odometry(sample)
         else:
-            if role == MAGNETIC_FIELD and self._turn.open and self._turn.note_field(sample):
-                self._tell(sample.time_us, self._turn.sentence)
+            if role == MAGNETIC_FIELD:
+                self._tell_each(sample.time_us, self._checks.note_field(sample))
             self._estimator.push(self._completion.sample(sample))
 
     def _tell_landed(self) -> None:
@@ -348,15 +345,11 @@ class FusionSession:
 
     def _push_odometry(self, sample: VisionSample) -> None:
         self._heading.push(sample)
-        if self._down.open:
-            self._down.note_odometry(sample)
-        if self._turn.open and self._turn.note_odometry(sample):
-            self._tell(sample.time_us, self._turn.sentence)
         jump = '' if self._inertial is None else self._inertial.jump()
         if jump:
             self._tell(sample.time_us, jump)
-        if self._twist.open and self._twist.note(sample, jumped=bool(jump)):
-            self._tell(sample.time_us, self._twist.sentence)
+        self._tell_each(
+            sample.time_us, self._checks.note_odometry(sample, jumped=bool(jump)))
         if self._motion is not None:
             self._motion.push_odometry(sample, jumped=bool(jump))
         self._estimator.push(sample if self._inertial is None else self._inertial.fused(sample))
@@ -389,10 +382,8 @@ class FusionSession:
         assert self._inertial is not None
         outputs: list[FusedOutput] = []
         increments = self._inertial.push(reading)
-        if self._down.open and self._down.note_imu(increments):
-            self._tell(reading.time_us, self._down.sentence)
-        if self._turn.open:
-            self._turn.note_imu(increments)
+        if self._checks.watches_imu:
+            self._tell_each(reading.time_us, self._checks.note_imu(increments))
         if role == ODOMETRY:
             self._push_odometry(reading)
         holding, intake = self._holding, self._intake
@@ -591,8 +582,7 @@ class FusionSession:
         lack = self._heading.lack if self._inertial_role == ODOMETRY else ''
         blind = NO_MOTION if self._local and self.roles is not None \
             and not self.roles & TELL_MOTION else ''
-        said = (self._down.sentence, self._turn.sentence, self._twist.sentence, lack, blind)
-        return [*self._rates.slow(), *filter(None, said)]
+        return [*self._rates.slow(), *self._checks.sentences(), *filter(None, (lack, blind))]
 
     def receivers(self) -> Sequence[ReceiverStatus]:
         """Return what becomes of each of several receivers, nothing where there is one."""
@@ -644,6 +634,10 @@ class FusionSession:
 
     def _tell(self, time_us: int, text: str) -> None:
         self._note((Event(time_us, text),))
+
+    def _tell_each(self, time_us: int, texts: Iterable[str]) -> None:
+        for text in texts:
+            self._tell(time_us, text)
 
     def _note(self, events: Sequence[Event]) -> None:
         if events:

@@ -22,8 +22,8 @@ LAYERS = (
     ('ekf2', 'lpe', 'health', 'odometry_imu', 'motion_heading', 'receivers'),
     ('messages',),
     (
-        'session', 'airspeed_conditions', 'completion', 'down_check', 'fix_assembly',
-        'fix_intake', 'fused_output', 'holding', 'inputs', 'map_origin', 'navigation_watch',
+        'session', 'airspeed_conditions', 'completion', 'down_check', 'fix_assembly', 'fix_intake',
+        'fused_output', 'holding', 'input_checks', 'inputs', 'map_origin', 'navigation_watch',
         'odometry_heading', 'pairing', 'roles', 'sample_check', 'sensor_rates', 'stamp_order',
         'statistics', 'turn_check', 'twist_check', 'warm_up',
     ),
