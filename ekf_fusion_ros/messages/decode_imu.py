@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import itertools
 from itertools import repeat
+import math
 from typing import Any
 from typing import NamedTuple
 
@@ -40,6 +42,10 @@ USUAL_OF = 25
 
 MISSING_FROM = 1.5
 """Multiple of the usual interval above which readings are missing."""
+
+SLOW_US, PART_US = 12_000, 5_000
+"""Interval above which a reading is split, and the longest part: the covariance of the filter
+counts periods of 10 ms, whatever they last."""
 
 # Places in the flat message, each vector before its covariance.
 ORIENTATION, ORIENTATION_COVARIANCE = slice(0, 4), 4
@@ -134,7 +140,8 @@ class ImuIntegrator:
     That is exact for sensors that publish means over their interval, as autopilots do. An interval
     much longer than the usual one means that readings are missing (loggers and best-effort topics
     lose some): they are interpolated between their neighbours. `gaps` counts the intervals above
-    `max_gap`; such a one is not filled at all but counts as one ordinary interval.
+    `max_gap`; such a one is not filled at all but counts as one ordinary interval. The intervals
+    of an IMU that is slower than the filter are split.
     """
 
     def __init__(self, params: MessageParams) -> None:
@@ -168,7 +175,7 @@ class ImuIntegrator:
         self._before = reading
         if step_us > self._max_gap_us:
             self.gaps += 1
-            return [_increments(reading, self._interval_us or self._max_gap_us)]
+            return _parts(_increments(reading, self._interval_us or self._max_gap_us))
         self._interval_us = step_us
         if 0 < self._longest_us < step_us:
             samples = self._bridge(before, reading)
@@ -176,6 +183,8 @@ class ImuIntegrator:
             samples = [reading.increment]
         else:
             samples = [_increments(reading, step_us)]
+        if step_us > SLOW_US:
+            samples = [part for sample in samples for part in _parts(sample)]
         steps_us = self._steps_us
         steps_us.append(step_us)
         if len(steps_us) == USUAL_OF:
@@ -211,6 +220,24 @@ def _increments(reading: ImuReading, step_us: int) -> ImuSample:
     return ImuSample(
         reading.time_us, np.multiply(reading.rate, dt), np.multiply(reading.specific_force, dt),
         dt, dt, orientation=reading.orientation)
+
+
+def _parts(sample: ImuSample) -> list[ImuSample]:
+    """Return a sample in equal parts, as it is where it is short enough."""
+    step_us = round(1e6 * sample.delta_velocity_dt)
+    if step_us <= SLOW_US:
+        return [sample]
+    count = math.ceil(step_us / PART_US)
+    ends_us = [step_us * k // count for k in range(count + 1)]
+    parts = []
+    for begin_us, end_us in itertools.pairwise(ends_us):
+        share = (end_us - begin_us) / step_us
+        dt = share * sample.delta_velocity_dt
+        parts.append(ImuSample(
+            sample.time_us - step_us + end_us, share * sample.delta_angle,
+            share * sample.delta_velocity, dt, dt))
+    parts[-1] = parts[-1]._replace(orientation=sample.orientation)
+    return parts
 
 
 def _check_present(numbers: Sequence[float], first: int, name: str) -> None:

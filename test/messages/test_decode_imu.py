@@ -117,9 +117,29 @@ def test_a_long_gap_counts_and_is_no_giant_increment():
     assert sample.time_us == 6_000_000
     assert sample.delta_angle_dt == pytest.approx(0.01)
     assert integrator.gaps == 1
-    sample, = integrator.push(reading_at(6_020_000))
-    assert sample.delta_angle_dt == pytest.approx(0.02)
+    samples = integrator.push(reading_at(6_020_000))
+    assert sum(sample.delta_angle_dt for sample in samples) == pytest.approx(0.02)
     assert integrator.gaps == 1
+
+
+@pytest.mark.parametrize('step_us', [13_001, 20_000, 30_303, 100_000])
+def test_a_slow_imu_is_split_without_loss(step_us):
+    integrator = ImuIntegrator(PARAMS)
+    north = np.array((1.0, 0.0, 0.0, 0.0))
+    for k in range(40):
+        samples = integrator.push(reading_at(1_000_000 + k * step_us)._replace(orientation=north))
+    assert max(sample.delta_angle_dt for sample in samples) < 0.0051
+    assert sum(sample.delta_angle_dt for sample in samples) == pytest.approx(1e-6 * step_us)
+    assert sum(sample.delta_angle for sample in samples) == pytest.approx(
+        1e-6 * step_us * np.array((0.1, 0.2, 0.3)))
+    assert sum(sample.delta_velocity for sample in samples) == pytest.approx(
+        1e-6 * step_us * np.array((1.0, 0.0, -9.8)))
+    times_us = [1_000_000 + 38 * step_us, *(sample.time_us for sample in samples)]
+    assert np.diff(times_us) * 1e-6 == pytest.approx(
+        [sample.delta_velocity_dt for sample in samples], abs=1e-9)
+    assert times_us[-1] == 1_000_000 + 39 * step_us
+    assert all(sample.orientation is None for sample in samples[:-1])
+    assert samples[-1].orientation is north
 
 
 def test_missing_readings_of_an_impact_are_interpolated():
