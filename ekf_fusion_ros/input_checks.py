@@ -16,12 +16,15 @@ from ekf_fusion_ros.twist_check import TwistCheck
 class InputChecks:
     """Runs each check until it has come to its conclusion; what is wrong is yielded once."""
 
-    def __init__(self, *, imu: bool) -> None:
-        """imu: one is in use; `watches_imu` until nothing is left to learn from it."""
+    def __init__(self, *, imu: bool, twist_frame: str) -> None:
+        """imu: one is in use; twist_frame is messages.odometry.twist_frame.
+
+        `watches_imu` until nothing is left to learn from it.
+        """
         self.watches_imu = imu
         self._down = DownCheck(imu=imu)
         self._turn = TurnCheck(imu=imu)
-        self._twist = TwistCheck()
+        self._twist = TwistCheck(twist_frame)
 
     def note_imu(self, increments: Sequence[ImuSample]) -> Iterator[str]:
         """Take increments."""

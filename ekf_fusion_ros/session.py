@@ -155,7 +155,8 @@ class FusionSession:
             role: AidingOrder(lead_us, age_limit_us(self.params, role)) for role in roles}
         self._rates = SensorRates(minimum_rates(self.params.ekf2, frozenset(roles)))
         self._heading = OdometryHeading()
-        self._checks = InputChecks(imu=IMU in roles)
+        self._checks = InputChecks(
+            imu=IMU in roles, twist_frame=self.params.messages.odometry.twist_frame)
         self._holding = Holding(round(1000 * session.hold_ms))
         self._completion = Completion(self.params.messages)
         self._intake = FixIntake(

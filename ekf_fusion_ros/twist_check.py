@@ -17,8 +17,13 @@ PATH_MIN, PATH_MAX = 15.0, 300.0
 
 IN_STEP, OUT_OF_STEP = 0.95, 0.8
 
-SENTENCE = ('the twist of the odometry follows its positions along the axes of header.frame_id, '
-            'not of the body: set messages.odometry.twist_frame to parent')
+SENTENCES = {
+    'child': 'the twist of the odometry follows its positions along the axes of header.frame_id, '
+             'not of the body: set messages.odometry.twist_frame to parent',
+    'parent': 'the twist of the odometry follows its positions along the axes of the body, not of '
+              'header.frame_id: set messages.odometry.twist_frame to child'}
+"""What is wrong, by where the twist is taken to lie. Turned into the body once too often, it is as
+coherent with the positions, mirrored, as one that should have been turned."""
 
 
 class TwistCheck:
@@ -29,8 +34,9 @@ class TwistCheck:
     only the one that is true.
     """
 
-    def __init__(self) -> None:
-        """Start without a message."""
+    def __init__(self, twist_frame: str = 'child') -> None:
+        """Start without a message; twist_frame is messages.odometry.twist_frame."""
+        self._twist_frame = twist_frame
         self.open = True
         self.sentence = ''
         self._path = 0.0
@@ -85,7 +91,7 @@ class TwistCheck:
         in_body = abs(self._turned_product) / self._scale(self._turned_power)
         if in_body < OUT_OF_STEP and plain / self._scale(self._plain_power) > IN_STEP:
             self.open = False
-            self.sentence = SENTENCE
+            self.sentence = SENTENCES[self._twist_frame]
         return bool(self.sentence)
 
     def _scale(self, power: float) -> float:

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from ekf_fusion_ros.frames import swap_attitude
+from ekf_fusion_ros.mathlib.rotation import matrix_from_quat
 from ekf_fusion_ros.params import Params
+from ekf_fusion_ros.params.tree import with_overrides
 from ekf_fusion_ros.samples import NAN3
 from ekf_fusion_ros.samples import NAN4
 from ekf_fusion_ros.samples import VelocityFrame
@@ -69,3 +71,16 @@ def test_the_session_warns():
         session.push(sample)
     assert 'messages.odometry.twist_frame' in session.health().text
     assert [event for event in session.drain_events() if 'twist_frame' in event.text]
+
+
+@pytest.mark.parametrize('turn_rate', [0.1, -0.1])
+def test_a_preset_for_the_wrong_source_is_told_the_other_way(turn_rate):
+    """A twist in the body that is taken for one along the frame of the positions."""
+    params = with_overrides(Params(), {'messages.odometry.twist_frame': 'parent'})
+    session = FusionSession(params, ['odometry'])
+    for sample in odometry(turn_rate, 'body', seconds=100.0):
+        forward, right, down = sample.velocity
+        as_if_enu = np.array((-right, forward, down))
+        session.push(sample._replace(
+            velocity=matrix_from_quat(sample.quaternion).T @ as_if_enu))
+    assert 'set messages.odometry.twist_frame to child' in session.health().text
