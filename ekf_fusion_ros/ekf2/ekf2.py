@@ -63,6 +63,9 @@ class Ekf2:
     def __init__(self, params: Ekf2Params | None = None) -> None:
         """Raise ValueError, naming the parameter, when one is out of range."""
         self.params = params or Ekf2Params()
+        if not isinstance(self.params, Ekf2Params):
+            raise TypeError(
+                f'{type(params).__name__}: expected Ekf2Params; of Params they are `.ekf2`')
         validate(self.params)
         self._imu_length, self._observation_length = buffer_lengths(
             max_delay_ms(self.params), self.params.timing.sensor_interval_min_ms)

@@ -76,6 +76,11 @@ def test_what_is_no_sample_is_told_from_samples():
         Ekf2().push('north')
 
 
+def test_parameters_of_everything_are_told_from_those_of_the_filter():
+    with pytest.raises(TypeError, match=r'Params: expected Ekf2Params; of Params they are `.ekf2`'):
+        Ekf2(Params())
+
+
 def test_armed_is_nothing_to_the_filter_of_a_session_without_roles():
     session = FusionSession(Params())
     session.push(ImuSample(1_000_000, np.zeros(3), np.array(REST), DT, DT))
