@@ -77,7 +77,7 @@ def test_what_is_no_sample_is_told_from_samples():
 
 
 def test_parameters_of_everything_are_told_from_those_of_the_filter():
-    with pytest.raises(TypeError, match=r'Params: expected Ekf2Params; of Params they are `.ekf2`'):
+    with pytest.raises(TypeError, match='expected Ekf2Params; of Params they are'):
         Ekf2(Params())
 
 
