@@ -84,6 +84,8 @@ YAW_WITHOUT_ODOMETRY = frozenset((FIX_VELOCITY, GPS_HEADING, MAGNETIC_FIELD))
 TELL_MOTION = frozenset((ODOMETRY, FIX, FLOW, AUX_VELOCITY, AIRSPEED))
 NO_MOTION = ('no topic in use tells horizontal motion, so that the place of the start is held: '
              'add one of odometry, fix, flow')
+NO_ALTITUDE = ('the fixes have no altitude: that of the origin is taken to be 0, and the vehicle '
+               'to stay there as far as no other topic tells')
 
 
 class FusionSession:
@@ -113,7 +115,8 @@ class FusionSession:
         self._inertial_role = IMU if roles is None or IMU in roles else ODOMETRY
         self._local = self._is_local()
         self._rate_mhz = round(1000 * self.params.session.output_rate)
-        self._last_altitude = 0.0
+        self._last_altitude: float | None = None
+        self._altitude_assumed = False
         self.restarts = 0
         self._resets_before: Counter[str] = Counter()
         self._passed_over_before: dict[str, Counter[str]] = {}
@@ -322,8 +325,9 @@ class FusionSession:
         if math.isfinite(fix.alt):
             self._last_altitude = fix.alt
             return fix
-        # A fix without height still places the vehicle; its height must carry no weight.
-        return fix._replace(alt=self._last_altitude, epv=NO_HEIGHT_EPV)
+        # A fix without height still places the vehicle; its height must carry little weight.
+        self._altitude_assumed |= self._last_altitude is None
+        return fix._replace(alt=self._last_altitude or 0.0, epv=NO_HEIGHT_EPV)
 
     def _aid(self, role: str, sample: Any) -> None:
         """Hand an aiding sample to the estimator and to what looks for yaw in motion."""
@@ -583,7 +587,9 @@ class FusionSession:
         lack = self._heading.lack if self._inertial_role == ODOMETRY else ''
         blind = NO_MOTION if self._local and self.roles is not None \
             and not self.roles & TELL_MOTION else ''
-        return [*self._rates.slow(), *self._checks.sentences(), *filter(None, (lack, blind))]
+        flat = NO_ALTITUDE if self._altitude_assumed and self._last_altitude is None else ''
+        return [*self._rates.slow(), *self._checks.sentences(),
+                *filter(None, (lack, blind, flat))]
 
     def receivers(self) -> Sequence[ReceiverStatus]:
         """Return what becomes of each of several receivers, nothing where there is one."""

@@ -159,6 +159,17 @@ def test_fix_without_height_carries_no_height_weight(build, estimator):
     assert second.epv > 100 * first.epv
 
 
+@pytest.mark.parametrize('altitude', [math.nan, 500.0])
+def test_fixes_that_never_tell_an_altitude_are_told(build, estimator, altitude):
+    session = session_of(estimator, 'imu', 'fix')
+    for step in range(3):
+        run_imu(session, build, START + step, START + step + 0.9)
+        message = build.fix(START + step + 0.9)
+        message.altitude = altitude
+        session.handle('fix', message)
+    assert any('no altitude' in text for text in session.warnings()) == math.isnan(altitude)
+
+
 def test_velocity_joins_the_fix_of_its_stamp(build, estimator):
     session = session_of(estimator, *ALL)
     run_imu(session, build, START, START + 1)
