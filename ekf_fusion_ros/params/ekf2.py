@@ -139,8 +139,9 @@ class GnssParams:
         True, 'Give the fixes that wait when the origin is set their place; PX4 takes them to be '
         'at the origin.')
     reset_at_start: bool = param(
-        True, 'Jump to the fix whenever aiding starts. Off, a position that dead reckoning has '
-        'kept since the last fix is corrected instead, where the fix passes the gate.', live=True)
+        True, 'Jump to the fix whenever aiding starts. Off, a position and velocity that dead '
+        'reckoning has kept since the last fix are corrected instead, where the fix passes the '
+        'gate.', live=True)
     correlation_time: float = param(
         0.0, 'Correlation time of the position errors. The noise of a fix grows as if fixes '
         'inside twice this time told as much as one; 0 = errors are white.', unit='s', min=0,

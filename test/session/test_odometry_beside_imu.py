@@ -86,3 +86,26 @@ def test_a_yaw_that_fixes_without_velocity_cannot_tell_is_named(velocity, told):
         session.push(arrival.sample)
     assert ('the fixes have no velocity; add a topic of fix_velocity'
             in session.health().text) == told
+
+
+@pytest.mark.parametrize('roles', [ROLES, ('odometry', 'fix')])
+def test_the_first_fix_after_a_gap_does_not_spoil_the_velocity(roles):
+    """Odometry knows the velocity ten times better than a receiver with 0.3 m/s of noise."""
+    gap = (60.0, 80.0)
+    for seed in (2, 4):
+        sensors = default_sensors(roles)
+        sensors['fix'] = replace(
+            sensors['fix'], outages=(gap,), stamp_delay=0.11, vel_noise=0.3)
+        flight = Scenario(
+            trajectory=Flight(duration=85.0, height=15.0), sensors=sensors, seed=seed)
+        session = FusionSession(Params(), [*roles, 'fix_velocity'])
+        rows = [(output.time_us, *output.nav.velocity[0:2]) for arrival in flight.arrivals()
+                for output in session.push(arrival.sample)]
+        table = np.array(rows)
+        time = 1e-6 * (table[:, 0] - flight.start_us)
+        error = np.linalg.norm(
+            table[:, 1:] - flight.trajectory.motion(time).velocity[:, 0:2], axis=1)
+        before, after = time > gap[0] + 10.0, time > gap[1]
+        assert error[after].max() < 1.2 * error[before & ~after].max()
+        aids = {aid.name: aid for aid in session.estimator.aid_statuses()}
+        assert aids['gnss_position'].last_fused_us > flight.start_us + 84_000_000

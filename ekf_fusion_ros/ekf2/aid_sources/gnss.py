@@ -19,9 +19,9 @@ from ekf_fusion_ros.ekf2.fusion import fuse_vertical_velocity
 from ekf_fusion_ros.ekf2.gnss_checks import GnssChecks
 from ekf_fusion_ros.ekf2.resets import Resets
 from ekf_fusion_ros.ekf2.state import FILTER_PERIOD_US
-from ekf_fusion_ros.ekf2.state import PE
 from ekf_fusion_ros.ekf2.state import PN
 from ekf_fusion_ros.ekf2.state import SECOND
+from ekf_fusion_ros.ekf2.state import VN
 from ekf_fusion_ros.ekf2.yaw_recovery import YawRecovery
 from ekf_fusion_ros.estimator import GeoPoint
 from ekf_fusion_ros.kernels.update import test_ratio
@@ -247,13 +247,16 @@ class Gnss:
         f = self._f
         assert f.fix is not None
         f.events.add(f.t_now, EventKind.GPS_STARTED)
-        if not self._continues():
+        if not self._continues(PN, f.fix.position, self._position_sigma(f.fix.hacc),
+                               f.params.gnss.pos_gate):
             self._resets.position_to_fix()
         if not f.flags.opt_flow and f.fix.has_velocity:
-            self._resets.velocity_to_fix()
+            sigma = max(f.fix.sacc, f.params.gnss.vel_noise)
+            if not self._continues(VN, f.fix.velocity, sigma, f.params.gnss.vel_gate):
+                self._resets.velocity_to_fix()
         elif not f.flags.aided_horizontally():
             self._resets.velocity_to_unknown()
-        f.flags.gps = True
+        f.flags.gps = self._has_aided = True
         if not self._flies_on_wings():
             # otherwise what follows a time-out is wanted too: a check of yaw by the course
             f.times.hor_pos = f.times.hor_vel = f.t_now
@@ -261,17 +264,14 @@ class Gnss:
     def _flies_on_wings(self) -> bool:
         return self._f.flags.fixed_wing and self._f.flags.in_air
 
-    def _continues(self) -> bool:
-        """True where the position kept by dead reckoning since the last fix passes the gate."""
+    def _continues(self, first: int, measured: Array, sigma: float, gate: float) -> bool:
+        """True where the two states kept by dead reckoning since the last fix pass the gate."""
         f = self._f
-        assert f.fix is not None
         if f.params.gnss.reset_at_start or not self._has_aided:
-            self._has_aided = True
             return False
-        gate, noise = f.params.gnss.pos_gate, self._position_sigma(f.fix.hacc) ** 2
         ratios = [
-            test_ratio(float(f.x[state] - position), f.cov.p[state, state] + noise, gate)
-            for state, position in zip((PN, PE), f.fix.position, strict=True)]
+            test_ratio(float(f.x[first + k] - measured[k]),
+                       f.cov.p[first + k, first + k] + sigma ** 2, gate) for k in range(2)]
         return max(ratios) <= 1.0
 
     def stop(self, reason: EventKind | None) -> None:
