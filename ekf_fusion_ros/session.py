@@ -588,7 +588,9 @@ class FusionSession:
         blind = NO_MOTION if self._local and self.roles is not None \
             and not self.roles & TELL_MOTION else ''
         flat = NO_ALTITUDE if self._altitude_assumed and self._last_altitude is None else ''
-        return [*self._rates.slow(), *self._checks.sentences(),
+        refused = [f'{role}: {counts.complaint}' for role, counts in self._statistics.items()
+                   if counts.complaint]
+        return [*refused, *self._rates.slow(), *self._checks.sentences(),
                 *filter(None, (lack, blind, flat))]
 
     def receivers(self) -> Sequence[ReceiverStatus]:

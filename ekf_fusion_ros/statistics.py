@@ -7,6 +7,9 @@ from dataclasses import field
 
 from ekf_fusion_ros.estimator import NavState
 
+JUDGED_FROM, MOSTLY = 50, 0.9
+"""Number of messages from which their use is judged, and the share that is nearly all of them."""
+
 
 @dataclass(slots=True)
 class RoleStatistics:
@@ -42,6 +45,15 @@ class RoleStatistics:
     def refused_total(self) -> int:
         """Number of refused messages over all reasons."""
         return sum(self.refused.values())
+
+    @property
+    def complaint(self) -> str:
+        """Sentence on messages of which hardly any is usable, '' where that is not so."""
+        refused = self.refused_total - self.refused.get('withheld', 0)
+        if self.received < JUDGED_FROM or refused < MOSTLY * self.received:
+            return ''
+        return (f'{refused} of {self.received} messages are refused, the last one as '
+                f'{self.last_refusal}')
 
     @property
     def pending(self) -> int:

@@ -96,3 +96,17 @@ def test_a_fix_whose_partner_never_comes_is_fused_all_the_same(part):
     for arrival in scenario.arrivals():
         session.push(arrival.sample)
     assert fused(session)['gnss_position'] > 100
+
+
+@pytest.mark.parametrize(('latency', 'told'), [(0.0, False), (3.0, True)])
+def test_a_topic_that_is_nearly_all_refused_is_named_with_the_reason(latency, told):
+    sensors = default_sensors(('imu', 'odometry', 'fix'))
+    sensors['odometry'] = replace(sensors['odometry'], latency=latency)
+    scenario = Scenario(
+        trajectory=Flight(duration=30.0, height=8.0), sensors=sensors, seed=11)
+    session = FusionSession(Params(), ['imu', 'odometry', 'fix'])
+    for arrival in scenario.arrivals():
+        session.push(arrival.sample)
+    text = session.health().text
+    assert ('messages are refused, the last one as too_old' in text) == told
+    assert any(one.startswith('odometry: ') for one in session.warnings()) == told
