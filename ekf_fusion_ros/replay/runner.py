@@ -28,6 +28,7 @@ from ekf_fusion_ros.inputs import ROLE_OF_SAMPLE
 from ekf_fusion_ros.params import Params
 from ekf_fusion_ros.replay.decoding import BatchDecoder
 from ekf_fusion_ros.replay.fix_distance import FixDistance
+from ekf_fusion_ros.replay.fused_bag import check_place
 from ekf_fusion_ros.replay.options import ReplayOptions
 from ekf_fusion_ros.replay.sinks import AlignmentSink
 from ekf_fusion_ros.replay.sinks import BagSink
@@ -79,16 +80,23 @@ def replay(options: ReplayOptions, say: Say = print) -> dict[str, Any]:
 
     `say` gets the choice of topics and what is worth knowing, a line at a time. Raises
     RecordingError where the recording cannot be used, ValueError for parameters that cannot
-    work together.
+    work together and for an output that would replace what is no output.
     """
-    if not options.recording.exists():
-        raise RecordingError(f'{options.recording}: does not exist')
+    check_paths(options)
     begin = time.process_time()
     make_kernels_ready()
     progress = Progress(kernel_seconds=time.process_time() - begin)
     if options.recording.name.endswith(CSV_SUFFIXES):
         return _replay_csv(options, progress, say)
     return _replay_bag(options, progress, say)
+
+
+def check_paths(options: ReplayOptions) -> None:
+    """Raise RecordingError without a recording, ValueError where the fused bag cannot go."""
+    if not options.recording.exists():
+        raise RecordingError(f'{options.recording}: does not exist')
+    if options.write_bag:
+        check_place(options.output, options.recording)
 
 
 @cache

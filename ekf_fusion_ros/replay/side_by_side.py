@@ -15,6 +15,7 @@ import numpy as np
 from ekf_fusion_ros.geo.projection import make_projection
 from ekf_fusion_ros.params import with_overrides
 from ekf_fusion_ros.replay.options import ReplayOptions
+from ekf_fusion_ros.replay.runner import check_paths
 from ekf_fusion_ros.replay.runner import replay
 
 Say = Callable[[str], None]
@@ -58,12 +59,16 @@ def replay_side_by_side(
 
     Raises what `replay` raises.
     """
-    chosen = {name: with_overrides(options.params, {'estimator': name}) for name in names}
+    chosen = {
+        name: replace(options, output=options.output / name,
+                      params=with_overrides(options.params, {'estimator': name}))
+        for name in names}
+    for one in chosen.values():
+        check_paths(one)
     summaries: dict[str, dict[str, Any]] = {}
-    for name, params in chosen.items():
+    for name, one in chosen.items():
         told: list[str] = []
-        summaries[name] = replay(
-            replace(options, output=options.output / name, params=params), told.append)
+        summaries[name] = replay(one, told.append)
         if len(summaries) == 1:
             # what it says of the recording holds for the others too
             for line in told:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 import math
 from pathlib import Path
-import shutil
 from typing import Any
 from typing import TextIO
 
@@ -27,6 +26,7 @@ from ekf_fusion_ros.messages.encode import odometry_numbers
 from ekf_fusion_ros.params import Params
 from ekf_fusion_ros.replay.cdr import fix_cdr
 from ekf_fusion_ros.replay.cdr import odometry_cdr
+from ekf_fusion_ros.replay.fused_bag import make_room
 from ekf_fusion_ros.session import FusionSession
 
 Array = NDArray[np.float64]
@@ -123,10 +123,7 @@ class BagSink:
     def __init__(self, folder: Path, params: Params, *, local: bool) -> None:
         self._frames = params.node.output_frame, params.node.base_link_frame
         self._projection_name = params.ekf2.earth.projection
-        path = folder / 'fused'
-        if path.exists():
-            shutil.rmtree(path)
-        self._writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
+        self._writer = Writer(make_room(folder), version=9, storage_plugin=StoragePlugin.MCAP)
         self._writer.open()
         store = get_typestore(Stores.ROS2_JAZZY)
         topics = {'/odometry/filtered': ODOMETRY}

@@ -7,6 +7,7 @@ from dataclasses import replace
 import gzip
 import json
 import math
+import shutil
 
 import numpy as np
 import pytest
@@ -283,6 +284,60 @@ def test_output_that_is_a_file(flight, tmp_path, capsys):
     (tmp_path / 'out').write_text('')
     assert run(flight[0], tmp_path / 'out') == 2
     assert 'out' in capsys.readouterr().err
+
+
+FILES_OF_A_USER = ('notes.txt', 'fused_0.mcap', 'metadata.yaml/notes.txt')
+
+
+@pytest.mark.parametrize('estimators', ['ekf2', 'lpe,ekf2'])
+@pytest.mark.parametrize('name', FILES_OF_A_USER)
+def test_a_fused_folder_of_someone_else_stays(flight, tmp_path, capsys, name, estimators):
+    """It is refused before anything is written, also where it is that of the second run."""
+    output = tmp_path / 'out'
+    place = output / 'ekf2' if ',' in estimators else output
+    (place / 'fused' / name).parent.mkdir(parents=True)
+    (place / 'fused' / name).write_text('mine')
+    before = sorted(output.rglob('*'))
+    assert main([str(flight[0]), '--output', str(output), '--estimator', estimators]) == 2
+    assert f'holds {name.split("/")[0]}' in capsys.readouterr().err
+    assert sorted(output.rglob('*')) == before
+    assert (place / 'fused' / name).read_text() == 'mine'
+
+
+def test_the_recording_that_is_read_is_never_replaced(flight, tmp_path, capsys):
+    place = tmp_path / 'fused'
+    shutil.copytree(flight[0], place)
+    (place / 'flight.mcap').rename(place / 'fused.mcap')
+    (tmp_path / 'link').symlink_to(place)
+    for recording in (place, place / 'fused.mcap', tmp_path / 'link'):
+        assert main([str(recording), '--output', str(tmp_path)]) == 2
+        assert 'holds the recording' in capsys.readouterr().err
+    assert (place / 'fused.mcap').stat().st_size > 1000
+    assert sorted(path.name for path in tmp_path.iterdir()) == ['fused', 'link']
+
+
+@pytest.mark.parametrize('kind', ['file', 'link'])
+def test_fused_that_is_no_folder_stays(flight, tmp_path, capsys, kind):
+    output, elsewhere = tmp_path / 'out', tmp_path / 'elsewhere'
+    output.mkdir()
+    elsewhere.mkdir()
+    if kind == 'file':
+        (output / 'fused').write_text('mine')
+    else:
+        (output / 'fused').symlink_to(elsewhere)
+    assert main([str(flight[0]), '--output', str(output)]) == 2
+    assert 'not a folder of an earlier replay' in capsys.readouterr().err
+    assert [path.name for path in output.iterdir()] == ['fused']
+    assert elsewhere.is_dir()
+
+
+def test_the_bag_of_an_earlier_replay_is_replaced(flight, replayed, tmp_path):
+    (tmp_path / 'fused').mkdir()
+    (tmp_path / 'fused' / 'fused.mcap').write_text('cut short, without its metadata')
+    assert main([str(flight[0]), '--output', str(tmp_path)]) == 0
+    assert main([str(flight[0]), '--output', str(tmp_path)]) == 0
+    bag = tmp_path / 'fused' / 'fused.mcap'
+    assert bag.read_bytes() == (replayed / 'fused' / 'fused.mcap').read_bytes()
 
 
 @pytest.mark.parametrize('name', ['none', 'none.mcap', 'none.csv'])

@@ -44,6 +44,7 @@ def options(tmp_path, monkeypatch):
 
     monkeypatch.setattr(side_by_side, 'replay', stand_in)
     monkeypatch.setattr(side_by_side, 'with_overrides', chosen)
+    (tmp_path / 'flight').touch()
     made = ReplayOptions(recording=tmp_path / 'flight', output=tmp_path, params=Params())
     return made, ran
 
