@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from dataclasses import field
 from dataclasses import replace
 import math
+import os
 from pathlib import Path
 import sys
 
@@ -30,7 +31,21 @@ examples:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a replay; return 0 done, 1 the recording could not be used, 2 wrong arguments."""
+    """Run a replay; return 0 done, 1 the recording could not be used, 2 wrong arguments.
+
+    Also 1, without a word, where nobody reads what is said any more, as after `| head -3`.
+    """
+    try:
+        status = _status(argv)
+        # What waits in the buffer would otherwise fail after the last chance to catch it.
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return UNUSABLE
+    return status
+
+
+def _status(argv: Sequence[str] | None) -> int:
     try:
         arguments = _parser().parse_args(argv)
     except SystemExit as stop:
@@ -41,8 +56,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail(str(error), UNUSABLE)
     except ValueError as error:
         return _fail(str(error), WRONG_ARGUMENTS)
+    except BrokenPipeError:
+        raise
     except OSError as error:
-        return _fail(f'{error.filename or arguments.output}: {error.strerror}', UNUSABLE)
+        reason = error.strerror or str(error) or type(error).__name__
+        return _fail(f'{error.filename or arguments.output}: {reason}', UNUSABLE)
     return DONE
 
 

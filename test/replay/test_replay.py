@@ -7,7 +7,11 @@ from dataclasses import replace
 import gzip
 import json
 import math
+import os
 import shutil
+import subprocess
+import sys
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -21,6 +25,7 @@ from rosbags.rosbag2 import Writer
 from rosbags.typesys import Stores
 from rosbags.typesys import get_typestore
 
+from ekf_fusion_ros.replay import cli
 from ekf_fusion_ros.replay.cli import main
 from ekf_fusion_ros.replay.recording import write_recording
 from ekf_fusion_ros.simulation.scenario import Scenario
@@ -358,6 +363,28 @@ def test_foreign_recording_ends_with_1_and_one_sentence(tmp_path, capsys, name, 
     said = capsys.readouterr().err.strip()
     assert name in said
     assert '\n' not in said
+
+
+@pytest.mark.parametrize(('arguments', 'buffering'), [
+    (['--help'], ''), (['--no-bag'], ''), (['--no-bag'], '1')])
+def test_a_reader_that_has_enough_is_no_error(flight, tmp_path, arguments, buffering):
+    reading, writing = os.pipe()
+    os.close(reading)
+    with open(writing, 'w') as pipe:
+        ended = subprocess.run(
+            [sys.executable, '-m', 'ekf_fusion_ros.replay.cli', str(flight[0]), '--output',
+             str(tmp_path / 'out'), '--end', '3', *arguments], stdout=pipe,
+            stderr=subprocess.PIPE, text=True, env=os.environ | {'PYTHONUNBUFFERED': buffering})
+    assert (ended.returncode, ended.stderr) == (1, '')
+
+
+@pytest.mark.parametrize(('error', 'words'), [
+    (OSError('disk on fire'), 'out: disk on fire'), (TimeoutError(), 'out: TimeoutError'),
+    (OSError(28, 'No space left on device', 'a.csv'), 'a.csv: No space left on device')])
+def test_an_error_of_the_system_is_told(flight, tmp_path, monkeypatch, capsys, error, words):
+    monkeypatch.setattr(cli, 'replay', Mock(side_effect=error))
+    assert run(flight[0], tmp_path / 'out') == 1
+    assert capsys.readouterr().err.rstrip().endswith(words)
 
 
 def test_a_folder_without_a_recording_ends_with_1(tmp_path, capsys):
