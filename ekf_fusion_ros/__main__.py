@@ -18,7 +18,6 @@ EXTRAS = {
     'rosbags': 'replay',
     'tqdm': 'replay',
     'matplotlib': 'plot',
-    'pygeomag': 'geo',
     'scipy': 'fast',
 }
 INTERRUPTED = 130

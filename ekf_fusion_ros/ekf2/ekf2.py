@@ -32,6 +32,7 @@ from ekf_fusion_ros.estimator import GeoPoint
 from ekf_fusion_ros.estimator import GivenPose
 from ekf_fusion_ros.estimator import Health
 from ekf_fusion_ros.estimator import NavState
+from ekf_fusion_ros.geo.magnetic_field import check_field
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 from ekf_fusion_ros.params.spec import validate
 from ekf_fusion_ros.samples import NO_CLIPPING
@@ -61,12 +62,13 @@ class Ekf2:
     """
 
     def __init__(self, params: Ekf2Params | None = None) -> None:
-        """Raise ValueError, naming the parameter, when one is out of range."""
+        """Raise ValueError, naming the parameter, when one is out of range or cannot be had."""
         self.params = params or Ekf2Params()
         if not isinstance(self.params, Ekf2Params):
             raise TypeError(
                 f'{type(params).__name__}: expected Ekf2Params; of Params they are `.ekf2`')
         validate(self.params)
+        check_field(self.params.mag.field_model)
         self._imu_length, self._observation_length = buffer_lengths(
             max_delay_ms(self.params), self.params.timing.sensor_interval_min_ms)
         self.reset()

@@ -35,10 +35,16 @@ class MagneticField(Protocol):
         """Return the field at sea level at a latitude and longitude in deg."""
 
 
+def check_field(name: str) -> None:
+    """Raise ValueError for a model whose package is missing, before anything hangs on it."""
+    if name == 'wmm':
+        _pygeomag()
+
+
 def make_field(name: str, decimal_year: float) -> MagneticField:
     """Return the model called `name` ('ecl_table' or 'wmm'); the table knows no year.
 
-    Raises ValueError on an unknown name, ImportError where pygeomag is missing.
+    Raises ValueError on an unknown name, and where pygeomag is missing.
     """
     if name == 'ecl_table':
         return EclFieldTable.load()
@@ -85,17 +91,12 @@ class WmmField:
     """World Magnetic Model through pygeomag, at sea level and one date."""
 
     def __init__(self, decimal_year: float) -> None:
-        """Set the date; ImportError without pygeomag.
+        """Set the date; ValueError without pygeomag.
 
         A year outside the models' (2010 to 2030), such as that of a simulation clock, counts as
         the nearest one inside; `year` is the one in use.
         """
-        try:
-            pygeomag: Any = import_module('pygeomag')
-        except ImportError as error:
-            raise ImportError(
-                "mag.field_model 'wmm' needs the package pygeomag: install it, "
-                "or set mag.field_model to 'ecl_table'") from error
+        pygeomag = _pygeomag()
         self.year = min(max(decimal_year, FIRST_YEAR), LAST_YEAR)
         model_year = int(self.year // 5.0) * 5
         self._model = pygeomag.GeoMag(base_year=model_year)
@@ -109,6 +110,15 @@ class WmmField:
         result = self._model.calculate(glat=lat, glon=lon, alt=0.0, time=self.year)
         return FieldPoint(
             math.radians(result.d), math.radians(result.i), result.f * GAUSS_PER_NANOTESLA)
+
+
+def _pygeomag() -> Any:
+    try:
+        return import_module('pygeomag')
+    except ImportError as error:
+        raise ValueError(
+            "ekf2.mag.field_model = 'wmm': needs the package pygeomag, which is not installed: "
+            "pip install 'ekf_fusion_ros[geo]', or choose ecl_table") from error
 
 
 def _normalised(lat: float, lon: float) -> tuple[float, float]:

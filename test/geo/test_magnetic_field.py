@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+import sys
 
 import pytest
 
+from ekf_fusion_ros.ekf2.ekf2 import Ekf2
 from ekf_fusion_ros.geo.magnetic_field import EclFieldTable
 from ekf_fusion_ros.geo.magnetic_field import FieldPoint
 from ekf_fusion_ros.geo.magnetic_field import WmmField
 from ekf_fusion_ros.geo.magnetic_field import make_field
+from ekf_fusion_ros.params import Params
+from ekf_fusion_ros.params import with_overrides
+from ekf_fusion_ros.session import FusionSession
 
 
 @pytest.mark.parametrize(('lat', 'lon', 'expected'), [
@@ -92,3 +97,12 @@ def test_wmm_covers_every_model_and_clamps_other_years() -> None:
 def test_unknown_model_lists_the_choices() -> None:
     with pytest.raises(ValueError, match='ecl_table, wmm'):
         make_field('igrf', 2025.0)
+
+
+def test_without_pygeomag_an_estimator_is_not_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, 'pygeomag', None)
+    params = with_overrides(Params(), {'ekf2.mag.field_model': 'wmm'})
+    for make in (lambda: Ekf2(params.ekf2), lambda: FusionSession(params, ('imu', 'fix'))):
+        with pytest.raises(ValueError, match=r'^ekf2\.mag\.field_model = .* pygeomag'):
+            make()
+    FusionSession(with_overrides(params, {'estimator': 'lpe'}), ('imu', 'fix'))

@@ -285,6 +285,14 @@ def test_wrong_arguments_end_with_2_and_a_sentence(flight, tmp_path, capsys, arg
     assert 'Traceback' not in said
 
 
+def test_a_field_model_without_its_package(flight, tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, 'pygeomag', None)
+    assert run(flight[0], tmp_path / 'out', '--set', 'ekf2.mag.field_model=wmm') == 2
+    said, = capsys.readouterr().err.splitlines()
+    assert 'pygeomag' in said
+    assert not (tmp_path / 'out' / 'trajectory.csv').exists()
+
+
 def test_output_that_is_a_file(flight, tmp_path, capsys):
     (tmp_path / 'out').write_text('')
     assert run(flight[0], tmp_path / 'out') == 2
