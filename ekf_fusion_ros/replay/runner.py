@@ -115,8 +115,8 @@ def make_kernels_ready() -> None:
 
 def _replay_bag(options: ReplayOptions, progress: Progress, say: Say) -> dict[str, Any]:
     with Recording(options.recording, ALL_TYPES) as recording:
-        choice = choose(
-            recording.topics, options.topics, str(options.recording), _switched_on(options.params))
+        choice = choose(recording.topics, options.topics, str(options.recording),
+                        *_switches(options.params))
         told = list(recording.notes)
         for line in [*told, *choice.lines()]:
             say(line)
@@ -143,10 +143,14 @@ def _replay_csv(options: ReplayOptions, progress: Progress, say: Say) -> dict[st
     return run.finish(Choice(), say)
 
 
-def _switched_on(params: Params) -> list[str]:
-    """Return the roles that parameters add; the node's usual ones say nothing."""
-    usual = Params().node.roles
-    return [role for role in params.node.roles if role not in usual]
+def _switches(params: Params) -> tuple[list[str], list[str]]:
+    """Return the roles that parameters add, and those they drop, against the node's usual ones.
+
+    The usual ones themselves say nothing, for they may be there by default.
+    """
+    usual, chosen = Params().node.roles, params.node.roles
+    return ([role for role in chosen if role not in usual],
+            [role for role in usual if role not in chosen])
 
 
 def _with_roles(params: Params, choice: Choice) -> Params:

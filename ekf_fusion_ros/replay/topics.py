@@ -79,39 +79,65 @@ class Choice:
 
 def choose(
     available: Mapping[str, Topic], wanted: Mapping[str, str], recording: str,
-    switched_on: Collection[str] = (),
+    switched_on: Collection[str] = (), switched_off: Collection[str] = (),
 ) -> Choice:
     """Return the topics to fuse.
 
     `wanted` maps a role to the topic asked for, '' to keep the role out. Roles not named there
-    are filled by type: those that are usual for the recording, and those that parameters have
-    `switched_on`. Raises RecordingError where a topic is missing or of the wrong type, or nothing
-    could be fused.
+    are filled by type: those that are usual for the recording unless parameters have them
+    `switched_off`, and those that parameters have `switched_on`. Raises RecordingError where a
+    topic is missing or of the wrong type, or nothing could be fused.
     """
     choice = Choice()
     for role, name in wanted.items():
         if name:
             choice.topics[role] = _asked_for(available, role, name, recording)
-    candidates = {role: _candidates(available, role) for role in TYPES}
-    has_odometry = roles.ODOMETRY in choice.topics or (
-        roles.ODOMETRY not in wanted and bool(candidates[roles.ODOMETRY]))
-    usual = WITH_ODOMETRY if has_odometry else WITHOUT_ODOMETRY
-    for role in (*usual, *switched_on):
-        taken = [topic.name for topic in choice.topics.values()]
-        free = [topic for topic in candidates[role] if topic.name not in taken]
-        if role not in wanted and free:
-            choice.topics[role] = free[0]
-    for role, fix in roles.NEEDED.items():
-        if fix not in choice.topics and role not in wanted:
-            choice.topics.pop(role, None)
-    choice.topics = {role: choice.topics[role] for role in TYPES if role in choice.topics}
-    _remark(choice, available, wanted)
+    off = [role for role in switched_off if role not in wanted]
+    on = [role for role in switched_on if role not in wanted]
+    _fill(choice, available, on, {*off, *wanted})
+    _remark(choice, available, wanted, off)
+    choice.remarks += [_without_topic(role, choice) for role in on if role not in choice.topics]
     try:
         roles.check_roles(choice.topics)
     except ValueError as error:
         have = ', '.join(f'{topic.name} ({topic.type})' for topic in available.values())
-        raise RecordingError(f'{recording}: {error}; the recording has {have or "none"}') from None
+        told = ''.join(f'{_switch(role)} is false, ' for role in off)
+        raise RecordingError(
+            f'{recording}: {error}; {told}the recording has {have or "none"}') from None
     return choice
+
+
+def _fill(
+    choice: Choice, available: Mapping[str, Topic], switched_on: Collection[str],
+    settled: Collection[str],
+) -> None:
+    """Add topics by type for the usual roles and those switched on, but for `settled` ones."""
+    candidates = {role: _candidates(available, role) for role in TYPES}
+    has_odometry = roles.ODOMETRY in choice.topics or (
+        roles.ODOMETRY not in settled and bool(candidates[roles.ODOMETRY]))
+    usual = WITH_ODOMETRY if has_odometry else WITHOUT_ODOMETRY
+    for role in (*usual, *switched_on):
+        taken = [topic.name for topic in choice.topics.values()]
+        free = [topic for topic in candidates[role] if topic.name not in taken]
+        if role not in settled and free:
+            choice.topics[role] = free[0]
+    for role, fix in roles.NEEDED.items():
+        if fix not in choice.topics and role not in settled:
+            choice.topics.pop(role, None)
+    choice.topics = {role: choice.topics[role] for role in TYPES if role in choice.topics}
+
+
+def _switch(role: str) -> str:
+    return f'node.use_{role}'
+
+
+def _without_topic(role: str, choice: Choice) -> str:
+    """Say why a role that parameters switch on has no topic."""
+    fix = roles.NEEDED.get(role)
+    if fix is not None and fix not in choice.topics:
+        return f'left out: {role}, switched on by {_switch(role)}, needs a {fix} topic beside it'
+    return (f'left out: {role}, switched on by {_switch(role)}: no topic of the recording '
+            f'fits; name one with --topic {role}=/name')
 
 
 def _asked_for(available: Mapping[str, Topic], role: str, name: str, recording: str) -> Topic:
@@ -148,7 +174,10 @@ def _likely_role(topic: Topic) -> str | None:
     return next(iter(named + plain), None)
 
 
-def _remark(choice: Choice, available: Mapping[str, Topic], wanted: Mapping[str, str]) -> None:
+def _remark(
+    choice: Choice, available: Mapping[str, Topic], wanted: Mapping[str, str],
+    switched_off: Collection[str],
+) -> None:
     """Say which topics were left out and how each could be added."""
     used = {topic.name for topic in choice.topics.values()}
     for topic in available.values():
@@ -162,7 +191,8 @@ def _remark(choice: Choice, available: Mapping[str, Topic], wanted: Mapping[str,
         elif role in wanted and not wanted[role]:
             choice.remarks.append(f'left out as asked: {topic.name} ({topic.type})')
         else:
-            choice.remarks.append(f'left out: {topic.name} ({topic.type}); {verb} with '
+            why = f', switched off by {_switch(role)}' if role in switched_off else ''
+            choice.remarks.append(f'left out: {topic.name} ({topic.type}){why}; {verb} with '
                                   f'--topic {role}={topic.name}{_beside(role, topic, choice)}')
 
 

@@ -234,6 +234,13 @@ def test_role_kept_out_and_role_added(flight, tmp_path, capsys):
     assert 'left out as asked: /mag' in capsys.readouterr().out
 
 
+def test_a_switch_of_the_node_holds_here_too(flight, tmp_path, capsys):
+    assert run(flight[0], tmp_path, '--end', '5', '--set', 'node.use_fix=false') == 0
+    assert 'switched off by node.use_fix' in capsys.readouterr().out
+    assert summary(tmp_path)['frame'] == 'local'
+    assert '/fix' not in summary(tmp_path)['topics']
+
+
 def test_what_was_refused_is_said_in_a_sentence(tmp_path, capsys):
     """Fixes that are recorded 0.6 s after their stamp come too late for the filter."""
     sensors = default_sensors(AUTOPILOT)

@@ -83,6 +83,31 @@ def test_further_roles_switched_on_by_parameters():
     assert 'gps_heading' not in names(topics.choose(FURTHER, {'fix': ''}, 'flight', every))
 
 
+def test_roles_switched_off_by_parameters():
+    available = recording(('/imu', IMU, 900), ('/odom', ODOM, 90), ('/fix', FIX, 9))
+    choice = topics.choose(available, {}, 'flight', (), ('fix',))
+    assert names(choice) == {'odometry': '/odom'}
+    assert ('left out: /fix (sensor_msgs/msg/NavSatFix), switched off by node.use_fix; '
+            'add it with --topic fix=/fix') in choice.remarks
+    # What the user names wins, and the rest is chosen as without the topic.
+    assert names(topics.choose(available, {'fix': '/fix'}, 'flight', (), ('fix',))) == {
+        'odometry': '/odom', 'fix': '/fix'}
+    assert names(topics.choose(available, {}, 'flight', (), ('odometry',))) == {
+        'imu': '/imu', 'fix': '/fix'}
+    with pytest.raises(storage.RecordingError, match=r'node\.use_odometry is false'):
+        topics.choose(recording(('/odom', ODOM, 90)), {}, 'flight', (), ('odometry',))
+
+
+def test_a_role_switched_on_without_a_topic_is_told():
+    available = recording(('/odom', ODOM, 90), ('/gps/heading', POSE, 9))
+    choice = topics.choose(available, {'flow': ''}, 'flight', ('range', 'gps_heading', 'flow'))
+    told = [line for line in choice.remarks if 'switched on' in line]
+    assert told == [
+        'left out: range, switched on by node.use_range: no topic of the recording fits; '
+        'name one with --topic range=/name',
+        'left out: gps_heading, switched on by node.use_gps_heading, needs a fix topic beside it']
+
+
 def test_of_several_the_choice_is_stable_and_said():
     available = recording(
         ('/b/odom', ODOM, 90), ('/a/odom', ODOM, 90), ('/odometry/filtered', ODOM, 900))
