@@ -13,10 +13,13 @@ LARGEST_DISTANCE = 1e6
 def fixed_origin(params: SessionParams) -> GeoPoint | None:
     """Return the origin that the parameters give, None where the first good fix sets it.
 
-    Raises ValueError for a point that is not on the earth.
+    Raises ValueError for a point that is not on the earth, and where none is given.
     """
     if params.origin_from != 'parameter':
         return None
+    if params.origin == SessionParams().origin:
+        raise ValueError("session.origin_from = 'parameter': give session.origin too, latitude "
+                         'and longitude in deg and altitude in m')
     origin = GeoPoint(*params.origin)
     if not origin.on_earth:
         raise ValueError(f'session.origin = {params.origin}: give latitude within -90 .. 90 deg, '

@@ -32,7 +32,7 @@ class SessionParams:
         choices=('first_fix', 'parameter'))
     origin: tuple[float, float, float] = param(
         (0.0, 0.0, 0.0), 'Fixed origin of the map: latitude and longitude in deg, altitude in m '
-        'in the datum of the fixes. Used with `session.origin_from: parameter`.')
+        'in the datum of the fixes. Used with `session.origin_from: parameter`, which needs it.')
     stamp_gap_max: float = param(
         5.0, 'Step of the inertial stamps above which the estimator starts again, once a second '
         'message confirms it.', unit='s', min=0.5, max=60)

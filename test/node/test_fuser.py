@@ -80,6 +80,7 @@ def test_signals_end_the_node_cleanly(
     ({'ekf2.gnss.no_such_thing': 1.0}, 'unknown parameter ekf2.gnss.no_such_thing'),
     ({'node.use_odometry': False}, 'inertial input'),
     ({'node.use_fix': False, 'node.use_fix_velocity': True}, 'fix_velocity needs a fix'),
+    ({'session.origin_from': 'parameter'}, 'give session.origin too'),
 ])
 def test_unusable_parameters_are_refused(
     start_fuser: StartFuser, parameters: dict[str, object], words: str,

@@ -50,6 +50,11 @@ def test_a_fixed_origin_that_is_not_on_the_earth_is_refused(estimator):
         session_of(estimator, **{**FIXED, 'session.origin': (91.0, 0.0, 0.0)})
 
 
+def test_a_fixed_origin_that_is_not_given_is_refused(estimator):
+    with pytest.raises(ValueError, match=r'session\.origin_from = .* session\.origin too'):
+        session_of(estimator, **{'session.origin_from': 'parameter'})
+
+
 def test_an_origin_set_before_the_first_fix_waits_for_it(build, estimator):
     session = session_of(estimator)
     assert session.set_origin(DATUM)
