@@ -124,7 +124,7 @@ def _replay_bag(options: ReplayOptions, progress: Progress, say: Say) -> dict[st
         progress.start_us = recording.start_ns // 1000
         progress.end_us = recording.end_ns // 1000
         _check_start(options, progress)
-        _check_withheld(options, choice)
+        _check_withheld(options, choice, progress)
         run = _Run(replace(options, params=params), list(choice.topics), progress)
         run.drive(_bag_steps(run, recording, choice))
         progress.notes = recording.notes
@@ -234,11 +234,17 @@ def _check_start(options: ReplayOptions, progress: Progress) -> None:
                          'after its start')
 
 
-def _check_withheld(options: ReplayOptions, choice: Choice) -> None:
-    for role in options.withhold:
+def _check_withheld(options: ReplayOptions, choice: Choice, progress: Progress) -> None:
+    duration = (progress.end_us - progress.start_us) / 1e6
+    end = duration if options.end is None else min(options.end, duration)
+    for role, windows in options.withhold.items():
         if role not in choice.topics:
             raise ValueError(f'--withhold {role}: no topic of {options.recording} has this role; '
                              f'in use are {", ".join(choice.topics)}')
+        for first, last in windows:
+            if first > end:
+                raise ValueError(f'--withhold {role}={first:g}:{last:g}: the replay of '
+                                 f'{options.recording} ends {end:.1f} s after its start')
 
 
 def _make_folder(options: ReplayOptions) -> None:

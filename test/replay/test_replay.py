@@ -277,6 +277,8 @@ def test_parameters_in_order_of_files_then_set(flight, tmp_path):
     (['--withhold', 'fix=20'], 'window'),
     (['--withhold', 'fix=20:10'], 'ends before'),
     (['--withhold', 'odometry=5:10'], 'no topic of'),
+    (['--withhold', 'fix=10:20,1000:2000'], 'fix=1000:2000: the replay of'),
+    (['--end', '20', '--withhold', 'fix=22:25'], 'ends 20.0 s after its start'),
     (['--start', '-1'], 'seconds from 0'),
     (['--start', '5', '--end', '4'], 'not after'),
     (['--start', '500'], 'ends 30'),
