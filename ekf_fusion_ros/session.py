@@ -118,6 +118,7 @@ class FusionSession:
         self._last_altitude: float | None = None
         self._altitude_assumed = False
         self.restarts = 0
+        self.first_restart_us: int | None = None
         self._resets_before: Counter[str] = Counter()
         self._passed_over_before: dict[str, Counter[str]] = {}
         self._home = fixed_origin(self.params.session)
@@ -445,6 +446,9 @@ class FusionSession:
 
     def _restart(self) -> None:
         self.restarts += 1
+        # The stamp before it: the one after may be of another clock.
+        if self.first_restart_us is None:
+            self.first_restart_us = self._now_us
         self.finish()
         self._collect()
         self._resets_before.update(self._estimator.reset_counts())

@@ -26,6 +26,8 @@ from ekf_fusion_ros.estimator import Event
 from ekf_fusion_ros.fused_output import FusedOutput
 from ekf_fusion_ros.inputs import ROLE_OF_SAMPLE
 from ekf_fusion_ros.params import Params
+from ekf_fusion_ros.replay.breaks import OutputGaps
+from ekf_fusion_ros.replay.breaks import restart_warnings
 from ekf_fusion_ros.replay.decoding import BatchDecoder
 from ekf_fusion_ros.replay.fix_distance import FixDistance
 from ekf_fusion_ros.replay.fused_bag import check_place
@@ -70,6 +72,7 @@ class Progress:
     withheld_distance: dict[str, Any] | None = None
     events: list[Event] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
     kernel_seconds: float = 0.0
     cpu_seconds: float = 0.0
     wall_seconds: float = 0.0
@@ -176,6 +179,7 @@ class _Run:
         self._bag = BagSink(options.output, options.params, local=self.session.local) \
             if options.write_bag else None
         self._rows: list[FusedOutput] = []
+        self._gaps = OutputGaps(self.session.params.session.output_rate)
         self._fix_distance = FixDistance(self.session.params)
         self._prediction = FixDistance(self.session.params)
         self.withholding = Withholding(options.withhold, progress.start_us)
@@ -197,14 +201,25 @@ class _Run:
             self.session.finish()
             self.progress.events = self.session.drain_events()
         self.progress.rows = self._track.rows
+        self.progress.warnings = self._breaks()
         self.progress.fix_distance = self._fix_distance.as_dict()
         self.progress.withheld_distance = self._prediction.as_dict()
         self.progress.cpu_seconds = time.process_time() - cpu
         self.progress.wall_seconds = time.perf_counter() - wall
 
+    def _breaks(self) -> list[str]:
+        """Say how the run was interrupted."""
+        start_us, end_us = self.progress.start_us, self.progress.end_us
+        if self.options.end is not None:
+            end_us = min(end_us, start_us + round(1e6 * self.options.end))
+        session = self.session
+        return [*restart_warnings(session.restarts, session.first_restart_us, start_us),
+                *self._gaps.warnings(start_us, end_us)]
+
     def _write(self, output: FusedOutput) -> None:
         if self.progress.first_output_us is None:
             self.progress.first_output_us = output.time_us
+        self._gaps.note(output.time_us)
         self._alignment.write(output, self.session)
         self._rows.append(output)
         if len(self._rows) >= BATCH:

@@ -66,7 +66,7 @@ def _content(
         'fix_distance': progress.fix_distance,
         'withheld_distance': progress.withheld_distance,
         'health': session.health().text,
-        'warnings': session.warnings(),
+        'warnings': [*session.warnings(), *progress.warnings],
         'notes': progress.notes,
         'cpu_seconds': progress.cpu_seconds,
         'kernel_loading_cpu_seconds': progress.kernel_seconds,

@@ -437,6 +437,52 @@ def test_truncated_recording_is_replayed_as_far_as_it_goes(flight, replayed, tmp
     assert any('damaged' in note for note in summary(tmp_path / 'out')['notes'])
 
 
+def rewritten(source, target, change):
+    """Write a recording again; change(topic, seconds) gives a shift of stamps, None drops."""
+    with Reader(source) as reader, \
+            Writer(target, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connections = {one.topic: writer.add_connection(one.topic, one.msgtype, typestore=STORE)
+                       for one in reader.connections}
+        for one, time_ns, data in reader.messages():
+            shift = change(one.topic, (time_ns - reader.start_time) * 1e-9)
+            if shift is not None:
+                message = STORE.deserialize_cdr(data, one.msgtype)
+                message.header.stamp.sec += shift
+                writer.write(connections[one.topic], time_ns,
+                             STORE.serialize_cdr(message, one.msgtype))
+
+
+def test_a_whole_run_has_no_warning_of_a_break(replayed):
+    assert not any('output' in told or 'again' in told for told in summary(replayed)['warnings'])
+
+
+def test_restarts_and_gaps_are_told(flight, tmp_path, capsys):
+    """The clock leaps by 20 s once, so that the estimator starts again and the rows pause."""
+    rewritten(flight[0], tmp_path / 'leap', lambda _, t: 20 if t > 13.0 else 0)
+    assert run(tmp_path / 'leap', tmp_path / 'out') == 0
+    restart, = [told for told in summary(tmp_path / 'out')['warnings'] if 'again' in told]
+    assert restart.startswith('the estimator started again once, 1')
+    assert float(restart.split()[5]) == pytest.approx(13.0, abs=0.1)
+    gap, = [told for told in summary(tmp_path / 'out')['warnings'] if 'no output' in told]
+    times = rows(tmp_path / 'out')[:, 0]
+    assert float(gap.split()[3]) == pytest.approx(np.diff(times).max(), abs=0.06)
+    said = capsys.readouterr().out
+    assert f'warning: {restart}' in said
+    assert f'warning: {gap}' in said
+
+
+def test_an_output_that_ends_early_is_told(flight, tmp_path):
+    rewritten(flight[0], tmp_path / 'dead', lambda topic, t: None if topic == '/imu/data_raw'
+              and t > 20.0 else 0)
+    assert run(tmp_path / 'dead', tmp_path / 'out') == 0
+    gap, = [told for told in summary(tmp_path / 'out')['warnings'] if 'no output' in told]
+    assert float(gap.split()[3]) == pytest.approx(10.0, abs=0.3)
+    assert float(gap.split()[6]) == pytest.approx(20.0, abs=0.3)
+    # Nothing is missing of what was asked for.
+    assert run(tmp_path / 'dead', tmp_path / 'part', '--end', '21') == 0
+    assert not any('no output' in told for told in summary(tmp_path / 'part')['warnings'])
+
+
 def spoil(message, rng):
     """Spoil a message in one of many ways."""
     ways = [
