@@ -15,6 +15,7 @@ from typing import Any
 from ekf_fusion_ros.airspeed_conditions import check_airspeed
 from ekf_fusion_ros.completion import Completion
 from ekf_fusion_ros.estimator import YAW_KNOWN_VARIANCE
+from ekf_fusion_ros.estimator import AidStatus
 from ekf_fusion_ros.estimator import Estimator
 from ekf_fusion_ros.estimator import Event
 from ekf_fusion_ros.estimator import GeoPoint
@@ -72,6 +73,7 @@ from ekf_fusion_ros.stamp_order import InertialOrder
 from ekf_fusion_ros.stamp_order import Step
 from ekf_fusion_ros.stamp_order import check_advance
 from ekf_fusion_ros.statistics import RoleStatistics
+from ekf_fusion_ros.statistics import counted_together
 from ekf_fusion_ros.statistics import note_milestones
 
 if TYPE_CHECKING:
@@ -121,6 +123,7 @@ class FusionSession:
         self.first_restart_us: int | None = None
         self._resets_before: Counter[str] = Counter()
         self._passed_over_before: dict[str, Counter[str]] = {}
+        self._aids_before: list[AidStatus] = []
         self._home = fixed_origin(self.params.session)
         self._landed: LandedSample | None = None
         self.milestones: dict[str, int] = {}
@@ -453,6 +456,7 @@ class FusionSession:
         self._collect()
         self._resets_before.update(self._estimator.reset_counts())
         self._passed_over_before = self._passed_over()
+        self._aids_before = self.aid_statuses()
         self._estimator.reset()
         self._navigation.restart()
         self._forget()
@@ -564,6 +568,10 @@ class FusionSession:
         for role, passed_over in self._intake.passed_over().items():
             counts[role] = counts.get(role, Counter()) + passed_over
         return counts
+
+    def aid_statuses(self) -> list[AidStatus]:
+        """Return the record of each kind of observation, its counts over all restarts."""
+        return counted_together(self._aids_before, self._estimator.aid_statuses())
 
     def resets(self) -> dict[str, int]:
         """Return how often each part of the state has jumped, and the session restarted."""

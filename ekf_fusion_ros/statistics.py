@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field
+from dataclasses import replace
 
+from ekf_fusion_ros.estimator import AidStatus
 from ekf_fusion_ros.estimator import NavState
 
 JUDGED_FROM, MOSTLY = 50, 0.9
@@ -85,3 +88,23 @@ def note_milestones(milestones: dict[str, int], nav: NavState) -> None:
         milestones.setdefault('yaw', nav.time_us)
     if nav.origin is not None:
         milestones.setdefault('origin', nav.time_us)
+
+
+def counted_together(before: Sequence[AidStatus], now: Sequence[AidStatus]) -> list[AidStatus]:
+    """Return the verdicts of now, counted on from those of before a restart.
+
+    A kind of observation that has not come again since is there with what it had, not active.
+    """
+    found = {aid.name: replace(aid, active=False) for aid in before}
+    for aid in now:
+        earlier = found.get(aid.name)
+        found[aid.name] = aid if earlier is None else _added(earlier, aid)
+    return list(found.values())
+
+
+def _added(earlier: AidStatus, later: AidStatus) -> AidStatus:
+    return replace(
+        later, fused=earlier.fused + later.fused, rejected=earlier.rejected + later.rejected,
+        starts=earlier.starts + later.starts, stops=earlier.stops + later.stops,
+        first_fused_us=earlier.first_fused_us if earlier.fused else later.first_fused_us,
+        last_fused_us=later.last_fused_us if later.fused else earlier.last_fused_us)

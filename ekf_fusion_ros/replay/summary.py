@@ -55,7 +55,7 @@ def _content(
         'home': _home(session.navigation.home),
         'navigation': _navigation(session.navigation),
         'topics': _topics(session, choice),
-        'aid_sources': {aid.name: _aid(aid) for aid in session.estimator.aid_statuses()},
+        'aid_sources': {aid.name: _aid(aid) for aid in session.aid_statuses()},
         'events': [{'time': event.time_us / SECOND_US, 'text': event.text}
                    for event in progress.events],
         'receivers': {one.name: _receiver(one) for one in session.receivers()},

@@ -471,6 +471,22 @@ def test_restarts_and_gaps_are_told(flight, tmp_path, capsys):
     assert f'warning: {gap}' in said
 
 
+def test_counts_of_the_aiding_go_on_over_a_restart(flight, tmp_path):
+    leap = 12.0
+    rewritten(flight[0], tmp_path / 'leap', lambda _, t: 20 if t > leap else 0)
+    assert run(tmp_path / 'leap', tmp_path / 'out') == 0
+    assert run(tmp_path / 'leap', tmp_path / 'before', '--end', str(leap)) == 0
+    start = summary(tmp_path / 'out')['start']
+    whole, before = (summary(tmp_path / name)['aid_sources']['gnss_position']
+                     for name in ('out', 'before'))
+    # Five fixes a second, in use from about 10 s after each start to the leap and to the end.
+    assert before['fused'] > 5
+    assert whole['fused'] > before['fused'] + 25
+    assert whole['starts'] == 2
+    assert whole['first'] == before['first'] < start + leap
+    assert whole['last'] > start + 20.0 + leap + 10.0
+
+
 def test_an_output_that_ends_early_is_told(flight, tmp_path):
     rewritten(flight[0], tmp_path / 'dead', lambda topic, t: None if topic == '/imu/data_raw'
               and t > 20.0 else 0)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from ekf_fusion_ros.estimator import AidStatus
 from ekf_fusion_ros.estimator import GeoPoint
 from ekf_fusion_ros.estimator import GivenPose
 from ekf_fusion_ros.geo.projection import make_projection
@@ -181,3 +182,22 @@ def test_what_is_off_the_map_is_refused():
         map_of_point(GeoPoint(-46.0, -170.0, 0.0), DATUM, 'wgs84')
     with pytest.raises(ValueError, match='farther than'):
         point_of_map(float('nan'), 0.0, 0.0, DATUM, 'wgs84')
+
+
+def aid(name, fused, first_us, last_us, active=True):
+    return AidStatus(name, active, last_us, (0.0,), (0.0,), 0.0, False, fused, 1, first_us,
+                     last_us, 1, 0)
+
+
+def test_counts_of_the_aiding_go_on_over_restarts(estimator, monkeypatch):
+    session = session_of(estimator)
+    found = [[aid('gnss_position', 3, 10, 30), aid('yaw', 4, 10, 20)],
+             [aid('gnss_position', 5, 50, 70)], [aid('gnss_position', 0, 0, 0, active=False)]]
+    monkeypatch.setattr(estimator, 'aid_statuses', lambda: found[0])
+    for _ in range(2):
+        session.reset()
+        del found[0]
+    fix, yaw = session.aid_statuses()
+    assert (fix.fused, fix.rejected, fix.starts) == (8, 3, 3)
+    assert (fix.first_fused_us, fix.last_fused_us, fix.active) == (10, 70, False)
+    assert (yaw.fused, yaw.rejected, yaw.last_fused_us, yaw.active) == (4, 1, 20, False)
