@@ -45,11 +45,19 @@ PERHAPS_MEASURED: dict[type[Any], dict[str, Shape]] = {
 
 NUMBERS: dict[type[Any], tuple[str, ...]] = {
     ImuSample: ('delta_angle_dt', 'delta_velocity_dt'),
-    GnssSample: ('lat', 'lon'),
+    GnssSample: ('lat', 'lon', 'eph'),
     BaroSample: ('altitude',),
     AirspeedSample: ('true_airspeed', 'eas2tas'),
     HeadingSample: ('yaw', 'variance'),
 }
+
+ACCURACIES: dict[type[Any], dict[str, str]] = {
+    GnssSample: {'epv': 'alt', 'sacc': 'velocity', 'yaw_offset': 'yaw'},
+    VisionSample: {'position_var': 'position', 'velocity_cov': 'velocity',
+                   'angular_var': 'quaternion'},
+}
+"""What must be finite where that which it belongs to was measured: axis by axis where both have
+the same axes."""
 
 
 def _places(
@@ -60,9 +68,10 @@ def _places(
 
 
 _CHECKS = {kind: (_places(kind, MEASURED), _places(kind, PERHAPS_MEASURED),
-                  tuple(kind._fields.index(name) for name in NUMBERS.get(kind, ())))
+                  tuple(kind._fields.index(name) for name in NUMBERS.get(kind, ())),
+                  tuple(kind._fields.index(name) for name in ACCURACIES.get(kind, ())))
            for kind in (*MEASURED, *PERHAPS_MEASURED, *NUMBERS)}
-_NOTHING: tuple[Any, Any, Any] = (), (), ()
+_NOTHING: tuple[Any, Any, Any, Any] = (), (), (), ()
 
 
 def admitted_imu(sample: ImuSample) -> ImuSample:
@@ -85,7 +94,7 @@ def admitted(sample: Any) -> Any:
     Raises ValueError, naming type and field, for a wrong shape and for numbers that are not
     finite where they must be.
     """
-    must, may, numbers = _CHECKS.get(type(sample), _NOTHING)
+    must, may, numbers, accuracies = _CHECKS.get(type(sample), _NOTHING)
     for place, shape in must:
         value = sample[place]
         # A sum is finite only where all of its terms are.
@@ -96,6 +105,11 @@ def admitted(sample: Any) -> Any:
             return _changed(sample)
     for place in numbers:
         if not math.isfinite(sample[place]):
+            return _changed(sample)
+    for place in accuracies:
+        value = sample[place]
+        if not math.isfinite(sum(value.ravel().tolist()) if type(value) is np.ndarray else value):
+            # Perhaps it belongs to nothing that was measured.
             return _changed(sample)
     return sample
 
@@ -127,7 +141,18 @@ def _wrong(sample: Any) -> list[str]:
     kind = type(sample)
     return [f'{kind.__name__}.{name} is {getattr(sample, name)}'
             for name in (*MEASURED.get(kind, {}), *NUMBERS.get(kind, ()))
-            if not np.isfinite(getattr(sample, name)).all()]
+            if not np.isfinite(getattr(sample, name)).all()] + [
+        f'{kind.__name__}.{name} is {getattr(sample, name)} beside a measured {of}'
+        for name, of in ACCURACIES.get(kind, {}).items()
+        if _is_missing(getattr(sample, name), getattr(sample, of))]
+
+
+def _is_missing(accuracy: Any, measured: Any) -> bool:
+    """Return whether an accuracy is not finite where that which it belongs to is."""
+    known, needed = np.isfinite(accuracy), np.isfinite(measured)
+    if known.shape != needed.shape:
+        return bool(needed.any() and not known.all())
+    return bool((needed & ~known).any())
 
 
 def _as_array(value: Any, shape: Shape, name: str) -> Any:

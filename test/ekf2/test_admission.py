@@ -9,6 +9,8 @@ import pytest
 
 from ekf_fusion_ros.ekf2.ekf2 import Ekf2
 from ekf_fusion_ros.params import Params
+from ekf_fusion_ros.samples import NAN3
+from ekf_fusion_ros.samples import NAN4
 from ekf_fusion_ros.samples import ArmedSample
 from ekf_fusion_ros.samples import BaroSample
 from ekf_fusion_ros.samples import FlowSample
@@ -56,6 +58,17 @@ def test_numbers_may_come_in_any_array(build):
     (lambda t: MagSample(t, 'north'), 'MagSample.field is'),
     (lambda t: BaroSample(t, NAN), 'BaroSample.altitude is nan'),
     (lambda t: GnssSample(t, NAN, 8.0, 400.0, 1.0, 1.5), 'GnssSample.lat is nan'),
+    (lambda t: GnssSample(t, 47.0, 8.0, NAN, NAN, NAN), 'GnssSample.eph is nan: must'),
+    (lambda t: GnssSample(t, 47.0, 8.0, 400.0, 1.0, math.inf), 'epv is inf beside a measured alt'),
+    (lambda t: GnssSample(t, 47.0, 8.0, 400.0, 1.0, 1.5, np.zeros(3)), 'GnssSample.sacc is nan'),
+    (lambda t: GnssSample(t, 47.0, 8.0, 400.0, 1.0, 1.5, yaw=1.0, yaw_offset=NAN),
+     'GnssSample.yaw_offset is nan beside a measured yaw'),
+    (lambda t: VisionSample(t, np.zeros(3), NAN4, position_var=np.array((0.1, NAN, 0.1))),
+     'VisionSample.position_var is .* beside a measured position'),
+    (lambda t: VisionSample(t, NAN3, NAN4, np.zeros(3), velocity_cov=np.diag((0.1, math.inf, 1))),
+     'VisionSample.velocity_cov is'),
+    (lambda t: VisionSample(t, NAN3, np.array((1.0, 0, 0, 0)), angular_var=NAN),
+     'VisionSample.angular_var is nan beside a measured quaternion'),
     (lambda t: VisionSample(t, np.zeros(3), np.zeros(3)), 'VisionSample.quaternion has'),
     (lambda t: FlowSample(t, np.zeros(3), np.zeros(3), 255, 0.1), 'FlowSample.flow has'),
 ])
@@ -69,6 +82,21 @@ def test_what_is_no_measurement_is_named_and_changes_nothing(sample, words):
     stand(ekf, seconds=1.0, begin_us=now_us)
     stand(untouched, seconds=1.0, begin_us=now_us)
     np.testing.assert_array_equal(ekf.states(), untouched.states())
+
+
+@pytest.mark.parametrize('sample', [
+    lambda t: GnssSample(t, 47.0, 8.0, NAN, 1.0, NAN, yaw_offset=NAN),
+    lambda t: GnssSample(t, 47.0, 8.0, 400.0, 1.0, 1.5, yaw=1.0, yaw_accuracy=NAN),
+    lambda t: VisionSample(t, np.array((0.0, 0.0, NAN)), NAN4, NAN3, np.array((0.1, 0.1, NAN)),
+                           np.full((3, 3), NAN), NAN),
+])
+def test_an_accuracy_of_what_was_not_measured_may_be_unknown(sample):
+    ekf = Ekf2()
+    now_us = stand(ekf)
+    ekf.push(sample(now_us))
+    stand(ekf, seconds=1.0, begin_us=now_us)
+    assert np.isfinite(ekf.filter.x).all()
+    assert np.isfinite(ekf.filter.cov.p).all()
 
 
 def test_what_is_no_sample_is_told_from_samples():
