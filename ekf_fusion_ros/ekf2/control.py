@@ -145,6 +145,8 @@ class Control:
         """Jump to a pose; relative heights follow, an absolute one may contradict it."""
         before = float(self._f.x[PD])
         take_pose(self._f, self.resets, pose)
+        if min(pose.position_var[0:2]) > 0.0:
+            self.fake_position.note_position()
         self._shift_heights(float(self._f.x[PD]) - before)
 
     def _shift_heights(self, shift: float) -> None:

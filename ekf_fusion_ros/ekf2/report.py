@@ -44,6 +44,8 @@ def nav_state(ekf: Ekf2) -> NavState:
     velocity_cov = row[VELOCITY_COVARIANCE].reshape(3, 3)
     if ekf.lapse.ahead:
         ekf.lapse.widen(pose_cov, velocity_cov)
+    if f.holding_position and ekf.control.fake_position.aloft:
+        ekf.control.fake_position.widen(pose_cov, velocity_cov)
     validity = ekf.control.validity
     terrain = ekf.control.terrain
     wind = f.flags.wind

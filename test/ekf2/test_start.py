@@ -13,6 +13,7 @@ import pytest
 from ekf_fusion_ros.ekf2.covariance import rotation_vector_variances
 from ekf_fusion_ros.ekf2.ekf2 import Ekf2
 from ekf_fusion_ros.estimator import GeoPoint
+from ekf_fusion_ros.estimator import GivenPose
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 from ekf_fusion_ros.params.ekf2 import ImuParams
 from ekf_fusion_ros.params.ekf2 import TimingParams
@@ -50,6 +51,24 @@ def test_without_aiding_no_position_is_valid(bench):
     assert not state.local_position_valid
     assert not state.global_position_valid
     assert state.dead_reckoning
+
+
+def test_a_held_position_is_as_good_as_stated_on_the_ground_and_drifts_in_the_air(bench):
+    bench.run(30.0)
+    state = bench.ekf.nav_state()
+    np.testing.assert_array_equal(state.pose_cov.diagonal()[0:3], bench.p[7:10])
+    np.testing.assert_array_equal(state.velocity_cov.diagonal(), bench.p[4:7])
+    bench.fly()
+    bench.run(30.0)
+    state = bench.ekf.nav_state()
+    # a velocity that walks by 1 m/s per root of a second, for 30 s
+    assert (state.pose_cov.diagonal()[0:2] > 0.95 * 30.0 ** 3 / 3.0).all()
+    assert (state.velocity_cov.diagonal()[0:2] > 0.95 * 30.0).all()
+    assert state.pose_cov[2, 2] == bench.p[9]
+    bench.ekf.set_pose(GivenPose(np.zeros(3), np.full(3, 0.01), 0.0, 0.0))
+    bench.run(1.0)
+    # at 5.5 m/s, nobody knows where to, for 1 s
+    assert 20.0 < bench.ekf.nav_state().pose_cov[0, 0] < 50.0
 
 
 def test_fixes_are_used_after_eleven_seconds(bench):

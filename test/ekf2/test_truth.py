@@ -39,7 +39,8 @@ class Flown:
     """Errors of a flight at 10 Hz: time (N,) s, NED position and velocity, yaw rad.
 
     horizon (N, 6): errors of position and velocity where the filter works, before the output
-    predictor; horizon_cov (N, 6, 6) what the filter says of them.
+    predictor; horizon_cov (N, 6, 6) what the filter says of them. stated (N, 9): variances that
+    the output states of position, rotation and velocity.
     """
 
     time: np.ndarray
@@ -48,11 +49,12 @@ class Flown:
     yaw: np.ndarray
     horizon: np.ndarray
     horizon_cov: np.ndarray
+    stated: np.ndarray
     innovations: dict[str, np.ndarray]
 
     def after(self, start: float, end: float = np.inf) -> Flown:
         kept = (self.time >= start) & (self.time < end)
-        columns = ('time', 'position', 'velocity', 'yaw', 'horizon', 'horizon_cov')
+        columns = ('time', 'position', 'velocity', 'yaw', 'horizon', 'horizon_cov', 'stated')
         return replace(self, **{name: getattr(self, name)[kept] for name in columns})
 
     def horizontal(self) -> np.ndarray:
@@ -123,7 +125,9 @@ def errors(scenario, rows, innovations):
         np.array([state.velocity for state in states]) - truth.velocity,
         np.remainder(yaw - truth.yaw + np.pi, 2 * np.pi) - np.pi,
         np.array(horizon) + np.hstack([origin - then.position, -then.velocity]),
-        np.array(horizon_cov), {name: rows for name, rows in innovations.items() if rows})
+        np.array(horizon_cov),
+        np.array([np.hstack((s.pose_cov.diagonal(), s.velocity_cov.diagonal())) for s in states]),
+        {name: rows for name, rows in innovations.items() if rows})
 
 
 def origin_ned(scenario, origin):
@@ -219,6 +223,24 @@ def test_yaw_is_left_to_gnss_in_flight_without_a_compass():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize('seed', range(3))
+def test_where_nothing_aids_in_flight_the_output_says_how_far_it_may_be_off(seed):
+    sensors = perfect_sensors()
+    sensors['imu'] = Imu(accel_bias=(0.05, -0.05, 0.0))
+    sensors['fix'] = replace(sensors['fix'], pos_noise=0.8, vel_noise=0.2,
+                             outages=((60.0, 95.0),))
+    flown = fly(sensors, seed=seed)
+    held = flown.after(72.0, 95.0)
+    errors = np.abs(np.hstack((held.position[:, 0:2], held.velocity[:, 0:2])))
+    sigmas = np.sqrt(held.stated[:, [0, 1, 6, 7]])
+    assert held.horizontal().max() > 30.0
+    assert (errors < 3.0 * sigmas).all()
+    for kind in (slice(0, 2), slice(2, 4)):
+        rms = np.sqrt((errors[:, kind] ** 2).mean())
+        assert np.sqrt((sigmas[:, kind] ** 2).mean()) < 10.0 * rms
+    assert np.sqrt(flown.after(105.0).stated[:, [0, 1, 6, 7]]).max() < 1.0
+
+
 def test_odometry_velocity_bridges_an_outage():
     def flown(with_odometry):
         sensors = perfect_sensors()
