@@ -14,7 +14,7 @@ class EventKind(Enum):
     GPS_FUSION_TIMEOUT = 'GNSS rejected for too long, reset to it'
     GPS_DATA_STOPPED = 'GNSS data stopped'
     GPS_DATA_STOPPED_ALTERNATE = 'GNSS data stopped; another source aids'
-    HEIGHT_TIMEOUT = 'height source timed out, reset height'
+    HEIGHT_RESET = 'reset height'
     NAVIGATION_STOPPED = 'no horizontal aiding, holding the last position'
     ACCEL_BIAS_RESET = 'inconsistent accelerometer bias, reset its covariance'
     BAD_YAW_COURSE_USED = 'bad yaw, aligned to the GNSS course'

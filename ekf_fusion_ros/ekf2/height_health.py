@@ -41,9 +41,12 @@ class HeightHealth:
         """Judge the vertical acceleration and reset a height that is not fused any more."""
         f = self._f
         self._judge_vertical_acceleration()
-        lost = f.late(f.times.hgt, TIMEOUT_US) or f.late(self._time_good_us, BAD_ACCEL_RESET_US)
-        if lost and f.flags.has_height():
-            self._recover()
+        if not f.flags.has_height():
+            return
+        if f.late(f.times.hgt, TIMEOUT_US):
+            self._recover('height source timed out')
+        elif f.late(self._time_good_us, BAD_ACCEL_RESET_US):
+            self._recover('the accelerometer contradicts the height')
 
     def _judge_vertical_acceleration(self) -> None:
         """Bad: two independent vertical sensors, or one while clipping, see the filter falling."""
@@ -84,7 +87,7 @@ class HeightHealth:
         elif self._clips > 0:
             self._clips -= 1
 
-    def _recover(self) -> None:
+    def _recover(self, reason: str) -> None:
         """Switch to a source that is there, or reset to the present one."""
         f = self._f
         if f.flags.baro_hgt:
@@ -98,9 +101,16 @@ class HeightHealth:
         else:
             recovered = self._recover_to_baro()
         if recovered:
-            f.events.add(f.t_now, EventKind.HEIGHT_TIMEOUT)
             f.times.hgt = f.t_now
+            before = f.x.item(PD)
             self._source.reset()
+            self._tell(reason, before - f.x.item(PD))
+
+    def _tell(self, reason: str, rise: float) -> None:
+        """Announce a reset that has lifted the height by `rise` m."""
+        f = self._f
+        f.events.add(f.t_now, EventKind.HEIGHT_RESET, f'{reason}; now {self._source.in_words()}, '
+                     f'{abs(rise):.1f} m {"higher" if rise >= 0.0 else "lower"}')
 
     def _recover_from_baro(self) -> bool:
         newest = self._gnss.buffer.newest

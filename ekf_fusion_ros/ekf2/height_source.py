@@ -14,6 +14,10 @@ from ekf_fusion_ros.ekf2.resets import UNKNOWN_CLIMB_VARIANCE
 from ekf_fusion_ros.ekf2.resets import Resets
 from ekf_fusion_ros.observation import Observation
 
+HEIGHT_WORDS = {'baro_hgt': 'barometric height', 'gps_hgt': 'GNSS height',
+                'rng_hgt': 'range height', 'ev_hgt': 'odometry height'}
+"""What is used where a flag is set, in words."""
+
 
 class HeightSource:
     """Selects a sensor and resets height to it.
@@ -119,6 +123,12 @@ class HeightSource:
             sample = newest
         if sample is not None and math.isfinite(sample.position[2]):
             self._resets.vertical_position(float(sample.position[2]), None)
+
+    def in_words(self) -> str:
+        """Return what the selected source is called."""
+        flags = self._f.flags
+        return next((words for name, words in HEIGHT_WORDS.items() if getattr(flags, name)),
+                    'no height')
 
     def active_record(self) -> Observation | None:
         """Return the record of the selected source."""

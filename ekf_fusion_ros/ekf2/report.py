@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ekf_fusion_ros.ekf2.height_source import HEIGHT_WORDS
 from ekf_fusion_ros.ekf2.operator_view import operator_values
 from ekf_fusion_ros.ekf2.state import SECOND
 from ekf_fusion_ros.ekf2.state import WIND
@@ -103,6 +104,9 @@ def _state(ekf: Ekf2) -> tuple[HealthLevel, str]:
         seconds = (f.t_now - f.last_aiding_us) * 1e-6
         since = f'for {seconds:.0f} s' if f.last_aiding_us else 'since the start'
         return HealthLevel.ERROR, f'dead reckoning on inertial data {since}'
+    if f.faults.accel_vertical:
+        return HealthLevel.WARN, ('the accelerometer contradicts the height sensors: vibration, '
+                                  f'or a height source that jumps; {_sources(ekf)}')
     if wants_gnss and not flags.gps:
         return HealthLevel.WARN, _without_gnss(ekf)
     rejected_us = f.t_now - f.times.hor_pos
@@ -129,6 +133,5 @@ def _sources(ekf: Ekf2) -> str:
         (flags.mag_3d, '3-axis magnetometer'), (flags.mag_hdg, 'magnetic heading'),
         (flags.gps_yaw, 'antenna yaw'), (flags.opt_flow, 'optical flow'),
         (flags.fuse_aspd, 'airspeed'),
-        (flags.baro_hgt, 'barometric height'), (flags.gps_hgt, 'GNSS height'),
-        (flags.rng_hgt, 'range height'), (flags.ev_hgt, 'odometry height'))
+        *((getattr(flags, name), word) for name, word in HEIGHT_WORDS.items()))
     return 'fusing ' + (', '.join(word for on, word in words if on) or 'nothing')

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ekf_fusion_ros.estimator import GeoPoint
+from ekf_fusion_ros.estimator import HealthLevel
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 from ekf_fusion_ros.params.ekf2 import GnssParams
 from ekf_fusion_ros.params.ekf2 import HeightParams
@@ -84,7 +85,28 @@ def test_a_glitch_of_the_barometer_is_rejected_and_a_new_level_is_taken_in_time(
     bench.run(4.0)
     assert bench.resets.pos_d == resets + 1
     assert bench.x[9] == pytest.approx(-60.0, abs=1.0)
-    assert any('height source timed out' in event.text for event in bench.ekf.drain_events())
+    assert told_resets(bench) == [
+        'reset height: height source timed out; now barometric height, 60.0 m higher']
+
+
+def told_resets(bench):
+    return [event.text for event in bench.ekf.drain_events() if 'reset height' in event.text]
+
+
+def test_a_jump_that_the_accelerometer_contradicts_is_no_time_out():
+    bench = Bench()
+    bench.sending.add('fix')
+    bench.run(15.0)
+    bench.altitude += 100.0
+    bench.fix.velocity = np.array((0.0, 0.0, -0.1))
+    bench.run(2.0)
+    assert told_resets(bench)[0] == ('reset height: the accelerometer contradicts the height; '
+                                     'now barometric height, 100.0 m higher')
+    told = bench.ekf.health()
+    assert told.level == HealthLevel.WARN
+    assert told.text.startswith('the accelerometer contradicts the height sensors: vibration, or')
+    bench.run(15.0)
+    assert bench.ekf.health().level == HealthLevel.OK
 
 
 def test_the_output_jumps_with_a_reset_of_the_filter():
