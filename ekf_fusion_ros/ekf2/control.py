@@ -39,6 +39,9 @@ from ekf_fusion_ros.estimator import GivenPose
 
 TILT_ALIGNED_VARIANCE = math.radians(3.0) ** 2
 AIRSPEED_RECENT_US = SECOND
+BANK_ACCURACY = 1.2
+"""Least accuracy in m/s that the yaw bank is told of a velocity: told less, it decides too early
+and is off by several of its sigmas (docs/px4_differences.md)."""
 
 
 class Control:
@@ -174,7 +177,11 @@ class Control:
         f = self._f
         self.bank.correct(f.imu.increments, f.flags.in_air, f.x, f.dt_avg)
         fix = f.fix
-        if self.gnss.popped and fix is not None and fix.has_velocity and fix.vacc > 0.0:
+        if not self.gnss.popped or fix is None or not fix.has_velocity:
+            return
+        if f.params.yaw_estimator.accuracy == 'speed':
+            self.bank.set_velocity(fix.velocity, max(fix.sacc, BANK_ACCURACY))
+        elif fix.vacc > 0.0:
             self.bank.set_velocity(fix.velocity, fix.vacc)
 
     def _note_activity(self) -> None:

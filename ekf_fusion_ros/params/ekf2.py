@@ -12,6 +12,7 @@ ZERO: Vector = (0.0, 0.0, 0.0)
 
 MAG_TYPES = ('auto', 'heading', 'three_axis', 'vtol', 'indoor', 'none')
 YAW_HOLDING = ('always', 'unaided', 'never')
+BANK_ACCURACIES = ('speed', 'vertical')
 HEIGHT_REFERENCES = ('baro', 'gnss', 'range', 'vision')
 VEHICLES = ('unspecified', 'multirotor', 'fixed_wing', 'rover')
 
@@ -444,6 +445,10 @@ class YawEstimatorParams:
     default_airspeed: float = param(15.0, 'Fixed-wing airspeed where none is measured.',
                                     unit='m/s', min=0, max=100, px4='EKF2_GSF_TAS',
                                     ecl='EKFGSF_tas_default')
+    accuracy: str = param(
+        'speed', 'What tells how good the velocity of a fix is: its own accuracy, at least '
+        '1.2 m/s (speed), or as in PX4 that of its height, m taken for m/s (vertical).',
+        choices=BANK_ACCURACIES)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 
+from ekf2.bench import Bench
 import numpy as np
 import pytest
 
 from ekf_fusion_ros.ekf2.yaw_estimator import YawEstimator
 from ekf_fusion_ros.kernels.prediction import GRAVITY
+from ekf_fusion_ros.params.ekf2 import Ekf2Params
+from ekf_fusion_ros.params.ekf2 import MagParams
+from ekf_fusion_ros.params.ekf2 import YawEstimatorParams
 
 DT = 0.01
 
@@ -45,6 +49,27 @@ def test_the_stated_sigma_covers_the_error():
         variances.append(bank.variance)
     assert np.mean(np.square(errors)) < 2.0 * np.mean(variances)
     assert np.sqrt(np.mean(np.square(errors))) < math.radians(10.0)
+
+
+def bank_after_a_run(accuracy, epv):
+    """Speed up to 8 m/s by fixes whose height is told to epv m; return yaw and variance."""
+    bench = Bench(Ekf2Params(mag=MagParams(type='none'),
+                             yaw_estimator=YawEstimatorParams(accuracy=accuracy)))
+    bench.sending = {'baro', 'fix'}
+    bench.fix.epv = epv
+    bench.run(4.0)
+    bench.fly()
+    bench.travel(8.0, 10.0)
+    bank = bench.ekf.control.bank
+    return bank.yaw, bank.variance
+
+
+def test_the_accuracy_of_the_height_is_none_of_the_velocity():
+    usual = bank_after_a_run('speed', 1.2)
+    assert bank_after_a_run('speed', 0.05) == bank_after_a_run('speed', 5.0) == usual
+    # 1.2 m taken for 1.2 m/s is what the floor is; less makes it too sure
+    assert bank_after_a_run('vertical', 1.2) == usual
+    assert bank_after_a_run('vertical', 0.05)[1] < 0.25 * usual[1]
 
 
 def test_without_motion_nothing_is_known():
