@@ -52,12 +52,18 @@ def _gnss(sample: GnssSample) -> None:
     _finite_or_absent('fix', sample.yaw)
     if math.isinf(sample.alt):
         raise Refused('not_finite', 'the altitude of a fix is infinite')
+    if sample.has_velocity:
+        _finite('fix', sample.sacc)
+        _variances('fix', sample.sacc)
+    if math.isfinite(sample.yaw):
+        _finite('fix', sample.yaw_offset)
 
 
 def _vision(sample: VisionSample) -> None:
-    for part in (sample.position[0:2], sample.quaternion, sample.velocity[0:2]):
+    for part in (sample.position[0:2], sample.quaternion, sample.velocity):
         _finite_or_absent('odometry', part)
-    if math.isfinite(sample.quaternion[0]):
+    if sample.has_attitude:
+        _finite('odometry', sample.angular_var)
         norm = float(np.linalg.norm(sample.quaternion))
         if abs(norm - 1.0) > QUATERNION_NORM_ERROR:
             reason = 'zero_quaternion' if norm < 1e-6 else 'bad_quaternion'

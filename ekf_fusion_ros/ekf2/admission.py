@@ -59,6 +59,11 @@ ACCURACIES: dict[type[Any], dict[str, str]] = {
 """What must be finite where that which it belongs to was measured: axis by axis where both have
 the same axes."""
 
+WHOLE: dict[type[Any], tuple[str, ...]] = {
+    GnssSample: ('velocity',), VisionSample: ('quaternion', 'velocity'),
+}
+"""Arrays that are measured throughout or not at all; of a position the height may be missing."""
+
 
 def _places(
     kind: type[Any], arrays: dict[type[Any], dict[str, Shape]],
@@ -69,9 +74,10 @@ def _places(
 
 _CHECKS = {kind: (_places(kind, MEASURED), _places(kind, PERHAPS_MEASURED),
                   tuple(kind._fields.index(name) for name in NUMBERS.get(kind, ())),
-                  tuple(kind._fields.index(name) for name in ACCURACIES.get(kind, ())))
+                  tuple(kind._fields.index(name) for name in ACCURACIES.get(kind, ())),
+                  tuple(kind._fields.index(name) for name in WHOLE.get(kind, ())))
            for kind in (*MEASURED, *PERHAPS_MEASURED, *NUMBERS)}
-_NOTHING: tuple[Any, Any, Any, Any] = (), (), (), ()
+_NOTHING: tuple[Any, ...] = (), (), (), (), ()
 
 
 def admitted_imu(sample: ImuSample) -> ImuSample:
@@ -94,7 +100,7 @@ def admitted(sample: Any) -> Any:
     Raises ValueError, naming type and field, for a wrong shape and for numbers that are not
     finite where they must be.
     """
-    must, may, numbers, accuracies = _CHECKS.get(type(sample), _NOTHING)
+    must, may, numbers, accuracies, whole = _CHECKS.get(type(sample), _NOTHING)
     for place, shape in must:
         value = sample[place]
         # A sum is finite only where all of its terms are.
@@ -110,6 +116,10 @@ def admitted(sample: Any) -> Any:
         value = sample[place]
         if not math.isfinite(sum(value.ravel().tolist()) if type(value) is np.ndarray else value):
             # Perhaps it belongs to nothing that was measured.
+            return _changed(sample)
+    for place in whole:
+        values = sample[place].tolist()
+        if math.isfinite(values[0]) and not math.isfinite(sum(values)):
             return _changed(sample)
     return sample
 
@@ -144,7 +154,10 @@ def _wrong(sample: Any) -> list[str]:
             if not np.isfinite(getattr(sample, name)).all()] + [
         f'{kind.__name__}.{name} is {getattr(sample, name)} beside a measured {of}'
         for name, of in ACCURACIES.get(kind, {}).items()
-        if _is_missing(getattr(sample, name), getattr(sample, of))]
+        if _is_missing(getattr(sample, name), getattr(sample, of))] + [
+        f'{kind.__name__}.{name} is {getattr(sample, name)}, measured in part'
+        for name in WHOLE.get(kind, ())
+        if len(set(np.isfinite(getattr(sample, name)))) > 1]
 
 
 def _is_missing(accuracy: Any, measured: Any) -> bool:

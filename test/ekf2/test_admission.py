@@ -69,6 +69,9 @@ def test_numbers_may_come_in_any_array(build):
      'VisionSample.velocity_cov is'),
     (lambda t: VisionSample(t, NAN3, np.array((1.0, 0, 0, 0)), angular_var=NAN),
      'VisionSample.angular_var is nan beside a measured quaternion'),
+    (lambda t: VisionSample(t, NAN3, np.array((1.0, 0, 0, NAN))), 'quaternion is .* in part'),
+    (lambda t: GnssSample(t, 47.0, 8.0, 400.0, 1.0, 1.5, np.array((0, 0, NAN)), 0.2),
+     'GnssSample.velocity is .* measured in part'),
     (lambda t: VisionSample(t, np.zeros(3), np.zeros(3)), 'VisionSample.quaternion has'),
     (lambda t: FlowSample(t, np.zeros(3), np.zeros(3), 255, 0.1), 'FlowSample.flow has'),
 ])

@@ -9,6 +9,7 @@ import pytest
 
 from ekf_fusion_ros.params import Params
 from ekf_fusion_ros.params import with_overrides
+from ekf_fusion_ros.samples import NAN3
 from ekf_fusion_ros.samples import AirspeedSample
 from ekf_fusion_ros.samples import AuxVelocitySample
 from ekf_fusion_ros.samples import FlowSample
@@ -16,10 +17,12 @@ from ekf_fusion_ros.samples import GnssSample
 from ekf_fusion_ros.samples import ImuSample
 from ekf_fusion_ros.samples import LandedSample
 from ekf_fusion_ros.samples import RangeSample
+from ekf_fusion_ros.samples import VisionSample
 from ekf_fusion_ros.session import FusionSession
 
 START = 1000.0
 NAN = math.nan
+LEVEL = np.array((1.0, 0.0, 0.0, 0.0))
 
 
 @pytest.fixture
@@ -208,6 +211,11 @@ def test_fixes_keep_their_order_and_wait_once(build, estimator, fly):
     (AirspeedSample(1, 1.0, 0.0), 'negative_airspeed'),
     (AuxVelocitySample(1, np.zeros(3), np.full(3, -1.0)), 'negative_covariance'),
     (GnssSample(1, 47.0, 8.0, 0.0, 1.0, 1.0, yaw=math.inf), 'not_finite'),
+    (GnssSample(1, 47.0, 8.0, 0.0, 1.0, 1.0, np.zeros(3)), 'not_finite'),
+    (GnssSample(1, 47.0, 8.0, 0.0, 1.0, 1.0, np.zeros(3), -0.1), 'negative_covariance'),
+    (GnssSample(1, 47.0, 8.0, 0.0, 1.0, 1.0, yaw=1.0, yaw_offset=NAN), 'not_finite'),
+    (VisionSample(1, NAN3, LEVEL, angular_var=NAN), 'not_finite'),
+    (VisionSample(1, NAN3, LEVEL, np.array((0.0, 0.0, NAN))), 'not_finite'),
 ])
 def test_samples_are_checked_at_the_door(estimator, sample, reason):
     session = FusionSession(Params(), estimator=estimator)
