@@ -207,6 +207,9 @@ class Resets:
             if f.params.vision.rotate:
                 position = f.rot_ev @ position
             self.horizontal_position(position, f.vision.position_var)
+        elif f.flags.opt_flow and f.params.aiding.doubt_held_position:
+            # Flow tells no place: that of before stays.
+            return
         elif f.flags.opt_flow:
             f.events.add(f.t_now, EventKind.POS_RESET_LAST_KNOWN)
             target = f.last_known_position if f.flags.in_air else np.zeros(2)

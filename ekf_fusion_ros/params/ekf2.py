@@ -415,6 +415,10 @@ class AidingParams:
         'unaided', 'Bound the yaw variance by a pseudo measurement while nothing measures yaw: '
         'always; while GNSS in flight does not tell it either (unaided); never.',
         choices=YAW_HOLDING)
+    doubt_held_position: bool = param(
+        True, 'After the last position was held for want of aiding, a velocity that returns takes '
+        'up there, as uncertain as the time in the air has made it; off, it takes up as certain '
+        'as it was held, and flow on the ground at the origin.')
     airspeed_delay_ms: float = param(100.0, 'Delay of the airspeed sensor.', unit='ms', min=0,
                                      max=300, px4='EKF2_ASP_DELAY', ecl='airspeed_delay_ms')
     airspeed_threshold: float = param(2.0, 'Airspeed above which it is used; 0 = never.',

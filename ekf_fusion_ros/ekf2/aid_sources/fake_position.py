@@ -44,7 +44,9 @@ class FakePosition:
     def step(self, checks: GnssChecks) -> None:
         """Run once per filter period, after all aid sources."""
         f = self._f
-        f.holding_position = not f.flags.aided_horizontally()
+        held, f.holding_position = f.holding_position, not f.flags.aided_horizontally()
+        if held and not f.holding_position:
+            self._leave()
         if not f.holding_position or not f.late(self._fused_us, INTERVAL_US):
             return
         if f.late(self._fused_us, REENTRY_US):
@@ -65,6 +67,14 @@ class FakePosition:
         self._resets.velocity_to_aiding(gnss_healthy)
         if self._fused_us != 0:
             f.events.add(f.t_now, EventKind.NAVIGATION_STOPPED)
+
+    def _leave(self) -> None:
+        """Where only velocity aids from now on, the place is as uncertain as it has become."""
+        f = self._f
+        tells_place = f.flags.gps or f.flags.ev_pos
+        if self.aloft and not tells_place and f.params.aiding.doubt_held_position:
+            f.cov.set_variances(PN, f.cov.p.diagonal()[PN:PN + 2] + self._moved())
+        self.aloft = self._variance_before = 0.0
 
     def note_position(self) -> None:
         """Let the doubt begin anew from a position that was given; the velocity stays unknown."""
@@ -93,8 +103,12 @@ class FakePosition:
         velocity has the variance s^2 + w^2 t, and the position, which is its integral, s^2 t^2 +
         w^2 t^3 / 3 beside what it had before. After a landing the velocity is known again.
         """
-        t, walk = self.aloft, VELOCITY_WALK ** 2
-        moved = (self._speed_square + walk * t / 3.0) * t ** 2
-        pose_cov.ravel()[[0, 7]] += self._variance_before + moved
+        pose_cov.ravel()[[0, 7]] += self._moved()
         if self._f.flags.in_air:
-            velocity_cov.ravel()[[0, 4]] += self._speed_square + walk * t
+            velocity_cov.ravel()[[0, 4]] += self._speed_square + VELOCITY_WALK ** 2 * self.aloft
+
+    def _moved(self) -> float:
+        """Return the variance in m^2 of where the vehicle has gone since, along each axis."""
+        t = self.aloft
+        return self._variance_before + (
+            self._speed_square + VELOCITY_WALK ** 2 * t / 3.0) * t ** 2
