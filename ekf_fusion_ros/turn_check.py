@@ -36,8 +36,9 @@ TIMES = 10.0
 class TurnCheck:
     """Compares turns by gyro with those of the odometry's attitude, or else of the field.
 
-    Of both what is constant is left out, so that neither a gyro bias nor a camera that sits turned
-    matters. The field shows only what is across it, and the gyro is compared in that.
+    Of both what is constant is left out, a gyro bias with it. Where the two do not go together, as
+    those of sensors that sit turned, nothing is said. The field shows only what is across it, and
+    the gyro is compared in that.
     """
 
     def __init__(self, *, imu: bool) -> None:
@@ -114,5 +115,6 @@ def _judgement(scale: float, by: str) -> str:
         return (f'the imu turns {abs(scale):.2g} times as far as {by}: its angular_velocity must '
                 'be in rad/s, one in deg/s turns 57 times as far')
     if scale < 0.0:
-        return f'the imu turns the other way than {by}: its angular_velocity has wrong signs'
+        return (f'the imu turns the other way than {by}: its angular_velocity has wrong signs, or '
+                'one of the two sits turned, set its mount_rpy')
     return ''
