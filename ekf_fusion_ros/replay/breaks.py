@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 SECOND_US = 1e6
 SHORTEST_S = 2.0
 
@@ -17,13 +19,14 @@ class OutputGaps:
         self._last_us = 0
         self._longest = (0, 0)
 
-    def note(self, time_us: int) -> None:
-        """Take the stamp of a row."""
-        if self._first_us is None:
-            self._first_us = time_us
-        else:
-            self._reach(time_us)
-        self._last_us = time_us
+    def note(self, times_us: Sequence[int]) -> None:
+        """Take the stamps of the next rows."""
+        for time_us in times_us:
+            if self._first_us is None:
+                self._first_us = time_us
+            else:
+                self._reach(time_us)
+            self._last_us = time_us
 
     def warnings(self, start_us: int, end_us: int) -> list[str]:
         """Say where the longest gap of a replay from start to end is, nothing without one."""

@@ -219,7 +219,6 @@ class _Run:
     def _write(self, output: FusedOutput) -> None:
         if self.progress.first_output_us is None:
             self.progress.first_output_us = output.time_us
-        self._gaps.note(output.time_us)
         self._alignment.write(output, self.session)
         self._rows.append(output)
         if len(self._rows) >= BATCH:
@@ -228,7 +227,8 @@ class _Run:
     def _flush(self) -> None:
         """Write the rows that have gathered."""
         rows, self._rows = self._rows, []
-        self._track.write([output.nav for output in rows])
+        self._gaps.note([row.time_us for row in rows])
+        self._track.write([row.nav for row in rows])
         self._fix_distance.note(rows, [fix for row in rows for fix in row.fixes])
         self._prediction.note(rows, self.withholding.take_fixes())
         if self._bag is not None and rows:

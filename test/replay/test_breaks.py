@@ -13,7 +13,7 @@ START = 1_000_000_000
 def told(rate, seconds, end):
     gaps = OutputGaps(rate)
     for second in seconds:
-        gaps.note(START + round(1e6 * second))
+        gaps.note([START + round(1e6 * second)])
     return gaps.warnings(START, START + round(1e6 * end))
 
 
@@ -37,7 +37,7 @@ def test_what_is_no_gap():
 def test_stamps_of_another_clock_say_nothing_of_the_end():
     gaps = OutputGaps(50.0)
     for second in (3.0, 3.1):
-        gaps.note(round(1e6 * second))
+        gaps.note([round(1e6 * second)])
     assert gaps.warnings(START, START + 90_000_000) == []
 
 
