@@ -82,17 +82,21 @@ def test_a_specific_force_that_is_not_gravity_is_told(share, words, states_attit
     assert words in check.sentence
 
 
-def test_without_gravity_the_reason_is_told_not_what_comes_later():
-    """Nothing starts then; to drive on would not help."""
+def flown(change):
+    """Return a session after a flight whose IMU samples were changed."""
     roles = ('odometry', 'fix', 'imu')
     flight = Scenario(
         trajectory=Flight(duration=25.0, height=15.0), sensors=default_sensors(roles), seed=1)
     session = FusionSession(Params(), list(roles))
     for arrival in flight.arrivals():
         sample = arrival.sample
-        if isinstance(sample, ImuSample):
-            sample = sample._replace(delta_velocity=sample.delta_velocity / 9.81)
-        session.push(sample)
+        session.push(change(sample) if isinstance(sample, ImuSample) else sample)
+    return session
+
+
+def test_without_gravity_the_reason_is_told_not_what_comes_later():
+    """Nothing starts then; to drive on would not help."""
+    session = flown(lambda imu: imu._replace(delta_velocity=imu.delta_velocity / 9.81))
     text = session.health().text
     assert text.startswith('gathering samples for the initial alignment')
     assert 'the specific force is 1.0 m/s^2' in text
@@ -101,16 +105,9 @@ def test_without_gravity_the_reason_is_told_not_what_comes_later():
 
 @pytest.mark.parametrize('turned', [False, True])
 def test_a_flight_warns_only_with_a_turned_imu(turned):
-    roles = ('odometry', 'fix', 'imu')
-    flight = Scenario(
-        trajectory=Flight(duration=25.0, height=15.0), sensors=default_sensors(roles), seed=1)
-    session = FusionSession(Params(), list(roles))
-    for arrival in flight.arrivals():
-        sample = arrival.sample
-        if turned and isinstance(sample, ImuSample):
-            sample = sample._replace(delta_angle=sample.delta_angle[[0, 2, 1]],
-                                     delta_velocity=sample.delta_velocity[[0, 2, 1]])
-        session.push(sample)
+    session = flown(lambda imu: imu._replace(
+        delta_angle=imu.delta_angle[[0, 2, 1]],
+        delta_velocity=imu.delta_velocity[[0, 2, 1]]) if turned else imu)
     told = [event.text for event in session.drain_events() if 'deg apart' in event.text]
     assert len(told) == turned
     assert session.warnings() == told
