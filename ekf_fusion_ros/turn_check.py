@@ -70,8 +70,10 @@ class TurnCheck:
 
     def note_field(self, sample: MagSample) -> bool:
         """Take a field, of no use once there was an attitude; returns what note_odometry does."""
+        if self._attitude is not None or not self._segment_ends(sample.time_us):
+            return False
         strength = float(np.linalg.norm(sample.field))
-        if self._attitude is not None or not strength or not self._segment_ends(sample.time_us):
+        if not strength:
             return False
         begin, self._field = self._field, sample.field / strength
         felt = self._next_segment(sample.time_us)

@@ -30,16 +30,8 @@ def attitude_error_jacobian(q: Array) -> Array:
 
 
 @kernel
-def pose_covariance(x: Array, p: Array) -> Array:
-    """Return (6, 6) of states and covariance: position NED, then rotations about earth axes."""
-    covariance = np.empty((6, 6))
-    fill_pose_covariance(x, p, covariance)
-    return covariance
-
-
-@kernel
 def fill_pose_covariance(x: Array, p: Array, covariance: Array) -> None:
-    """Write pose_covariance(x, p) into covariance (6, 6)."""
+    """Write that of position NED, then rotations about earth axes, into covariance (6, 6)."""
     jacobian = attitude_error_jacobian(x)
     turned = np.empty(4)
     for i in range(3):

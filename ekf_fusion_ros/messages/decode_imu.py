@@ -235,8 +235,8 @@ def _parts(sample: ImuSample) -> list[ImuSample]:
         dt = share * sample.delta_velocity_dt
         parts.append(ImuSample(
             sample.time_us - step_us + end_us, share * sample.delta_angle,
-            share * sample.delta_velocity, dt, dt))
-    parts[-1] = parts[-1]._replace(orientation=sample.orientation)
+            share * sample.delta_velocity, dt, dt,
+            orientation=sample.orientation if end_us == step_us else None))
     return parts
 
 

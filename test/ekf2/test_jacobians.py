@@ -29,7 +29,7 @@ from ekf_fusion_ros.ekf2.heading import HeadingFusion
 from ekf_fusion_ros.ekf2.heading import mag_yaw
 from ekf_fusion_ros.kernels.heading import yaw_gradient
 from ekf_fusion_ros.kernels.navigation import attitude_error_jacobian
-from ekf_fusion_ros.kernels.navigation import pose_covariance
+from ekf_fusion_ros.kernels.navigation import fill_pose_covariance
 from ekf_fusion_ros.params.ekf2 import Ekf2Params
 
 Rotation = pytest.importorskip('scipy.spatial.transform').Rotation
@@ -214,6 +214,12 @@ def test_attitude_error(q):
         return (scipy_rotation(s) * scipy_rotation(q).inv()).as_rotvec()
 
     np.testing.assert_allclose(attitude_error_jacobian(q), difference(error, q, 1e-6), atol=1e-6)
+
+
+def pose_covariance(q, p):
+    covariance = np.empty((6, 6))
+    fill_pose_covariance(q, p, covariance)
+    return covariance
 
 
 @MANY

@@ -79,8 +79,7 @@ class FakePosition:
     def note_position(self) -> None:
         """Let the doubt begin anew from a position that was given; the velocity stays unknown."""
         self._speed_square += VELOCITY_WALK ** 2 * self.aloft
-        self._variance_before = 0.0
-        self.aloft = 0.0
+        self.aloft = self._variance_before = 0.0
 
     def _fuse(self) -> None:
         f = self._f
